@@ -43,7 +43,7 @@ class SpectrumFeatures:
         names=(
             "variable_step",
             "index_ratio_derivative",
-            "medium_slope",
+            "index_slope",
             "dposition_dvar0",
             "spectral_variable",
             "VARIABLE_ROW",

@@ -53,11 +53,7 @@ Path camera_path(uvec2 pixel, uint primary_sample, float gain) {
 }
 
 void begin_sample(uvec2 pixel) {
-    if (RGB_CHANNELS) {
-        turn = p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
-    } else {
-        turn = p.sample_index;
-    }
+    turn = RGB_CHANNELS && p.counts_turns != 0u ? uint(imageLoad(picture[0], ivec2(pixel)).w) : p.sample_index;
     for (int t = 0; t < TARGETS; ++t) radiance[t] = vec4(0.0);
 }
 
@@ -175,8 +171,7 @@ void follow(uint entry, bool resumes) {
                 goes_on = specular && !leaves;
                 if (COATS) goes_on = goes_on || (coated && !event_limit_reached && path.depth < uint(MAX_DEPTH));
                 if (goes_on) meet_surface(path, hit, kind, pixel_key);
-                if (HAS_GRATING || COATS || ROUGH_SURFACES || HAS_CRYSTAL || HAS_POLARISER || RANDOM_WAVELENGTH)
-                    goes_on = goes_on && path.walk.inverse_pdf > 0.0;
+                goes_on = goes_on && path.walk.inverse_pdf > 0.0;
             }
             if (SPECTRAL_SWEEP && cut_at >= 0.0) cut_band(path, cut_at, pixel_key);
             if (HALTS) halts = rounds >= uint(RANDOM_WAVELENGTH ? HALT_ROUNDS / 3 : HALT_ROUNDS);

@@ -2,96 +2,60 @@
 // weak, one is sampled for all.
 
 #include "path/crystal.glsl"
-#if HAS_POLARISER
 #include "path/polariser.glsl"
-#endif
 
-// The path turned into a lobe, of which it has `share` of its light over its band.
-void send_lobe(inout Path path, Hit hit, Event event, CrystalEvent met, uint lobe, vec3 share) {
+// The path turned into a lobe, which is followed with this probability.
+void send_lobe(inout Path path, Hit hit, Event event, CrystalEvent met, uint lobe, float probability) {
     bool onward = (lobe & LOBE_ONWARD) != 0u, entering = dot(path.direction, hit.normal_g) < 0.0, geometric;
+    vec3 share = lobe_share(met, lobe) / probability;
     turn_crystal(path, event, met, lobe, geometric);
     path.throughput *= share;
+    path.walk.branch_weight *= dot(share, OVER_BAND);
     path.walk.key = hash_combine(path.walk.key, 32u + lobe);
-    if (SURFACE_FILTERS && onward) {
-        vec4 passed = object_colours[hit.object];
-        add_length(path, int(passed.x), 1.0);
-        path.walk.branch_weight *= passed.y;
-    }
+    if (SURFACE_FILTERS && onward) filter_path(path, hit);
     leave_surface(path, hit, onward == entering);
 }
 
 // One crystal surface: `path` goes on, other lobes are put on the stack.
 void cross_crystal(inout Path path, Hit hit, Event event, uint pixel_key) {
-    const vec3 over_band = vec3(0.25, 0.5, 0.25);
-    uint first = 0u;
+    Path whole = path;
+    CrystalEvent outside = crystal_event(path, event), met = outside;
     if (HAS_DISPERSION && path.restricted == 0u) {
-        // What is reflected off the outside knows no wavelength but in its strength: it stays whole. What goes on is
-        // one band.
-        Path mirrored = path;
         restrict_to_band(path, pixel_key);
-        if (crystal_of(event.boundary.before) == NONE && stack_size < STACK) {
-            CrystalEvent whole = crystal_event(mirrored, event);
-            vec3 share = lobe_share(whole, 0u);
-            first = 1u;
-            if (share.y > 0.0) {
-                mirrored.walk.branch_weight *= dot(share, over_band);
-                send_lobe(mirrored, hit, event, whole, 0u, share);
-                push(mirrored);
-            }
-        }
+        met = crystal_event(path, event);
     }
-    CrystalEvent met = crystal_event(path, event);
-    float all = 0.0, strongest = 0.0;
-    uint kept = first, count = 0u;
-    for (uint lobe = first; lobe < MOST_LOBES; ++lobe) {
-        float share = dot(lobe_share(met, lobe), over_band);
-        all += share;
-        count += uint(share > 0.0);
-        kept = share > strongest ? lobe : kept;
-        strongest = max(strongest, share);
-    }
+    vec4 likely = met.shares * OVER_BAND;
+    uint kept = strongest_lobe(likely);
+    float all = dot(likely, vec4(1.0)), least = min(all - likely[kept], likely[kept]);
     if (all <= 0.0) {
         path.walk.inverse_pdf = 0.0;
         return;
     }
-    bool strong =
-        count < 2u || path.depth <= 1u || path.walk.branch_weight * min(all - strongest, strongest) > p.split_threshold;
-    bool splits = strong && stack_size + int(count) <= STACK + 1;
+    bool strong = least > 0.0 && (path.depth <= 1u || path.walk.branch_weight * least > p.split_threshold),
+         splits = strong && stack_size + LOBES - 1 <= STACK;
     if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
-    if (splits) {
-        for (uint lobe = first; lobe < MOST_LOBES; ++lobe) {
-            vec3 share = lobe_share(met, lobe);
-            float likely = dot(share, over_band);
-            if (lobe == kept || likely <= 0.0) continue;
-            Path part = path;
-            part.walk.branch_weight *= likely;
-            send_lobe(part, hit, event, met, lobe, share);
-            push(part);
-        }
-        path.walk.branch_weight *= strongest;
-        send_lobe(path, hit, event, met, kept, lobe_share(met, kept));
-        return;
+    if (!splits) kept = chosen_lobe(likely, choice(path, pixel_key) * all);
+    for (uint lobe = 0u; splits && lobe < uint(LOBES); ++lobe) {
+        if (lobe == kept || likely[lobe] <= 0.0) continue;
+        Path part = path;
+        // What is reflected off the outside knows no wavelength but in its strength: it stays whole.
+        bool stays = lobe == 0u && !met.from_crystal;
+        if (stays) part = whole;
+        send_lobe(part, hit, event, stays ? outside : met, lobe, 1.0);
+        push(part);
     }
-    float draw = choice(path, pixel_key) * all, below = 0.0;
-    for (uint lobe = first; lobe < MOST_LOBES; ++lobe) {
-        float share = dot(lobe_share(met, lobe), over_band);
-        if (share > 0.0 && below <= draw) kept = lobe;
-        below += share;
-    }
-    vec3 share = lobe_share(met, kept);
-    path.walk.branch_weight *= all;
-    send_lobe(path, hit, event, met, kept, share * (all / dot(share, over_band)));
+    bool stays = kept == 0u && !met.from_crystal;
+    if (stays) path = whole;
+    send_lobe(path, hit, event, stays ? outside : met, kept, splits ? 1.0 : likely[kept] / all);
 }
 
-#if HAS_POLARISER
 void cross_polariser(inout Path path, Hit hit, uint texel, uint pixel_key) {
     bool entering = dot(path.direction, hit.normal_g) < 0.0;
     Crystal sheet = crystal_at(texel);
     if (HAS_DISPERSION && path.restricted == 0u && sheet.retardance_um != 0.0) restrict_to_band(path, pixel_key);
     vec3 share = pass_polariser(path, sheet);
     path.throughput *= share;
-    path.walk.branch_weight *= dot(share, vec3(0.25, 0.5, 0.25));
+    path.walk.branch_weight *= dot(share, OVER_BAND);
     if (all(lessThanEqual(share, vec3(0.0)))) path.walk.inverse_pdf = 0.0;
     leave_surface(path, hit, entering);
 }
-#endif

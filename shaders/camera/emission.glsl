@@ -10,19 +10,14 @@ layout(binding = UNIT_EMISSION) uniform sampler2D emission_table;
 int emission_cell(float x) { return int(clamp(x, 0.0, 1.0) * float(EMISSION_CELLS) + 0.5); }
 
 vec4 emission_until(uint row, int target, int cell) {
-    if (SCENE_IMAGE) {
-        return imageLoad(emission_table, ivec2(cell, int(row) * TARGETS + target));
-    } else {
-        return texelFetch(emission_table, ivec2(cell, int(row) * TARGETS + target), 0);
-    }
+    return SCENE_IMAGE ? imageLoad(emission_table, ivec2(cell, int(row) * TARGETS + target))
+                       : texelFetch(emission_table, ivec2(cell, int(row) * TARGETS + target), 0);
 }
 
 // What a path lets through at the wavelength x.
 float transmitted(Path path, float x) {
     float kept = band_weight(path.band, path.throughput, x);
-#if HAS_FILM
-    kept *= left_by_films(path.walk, x);
-#endif
+    if (HAS_FILM) kept *= left_by_films(path.walk, x);
     if (ABSORPTION) {
         float depth = 0.0;
         for (int i = 0; i < ABSORBERS; ++i)
@@ -53,12 +48,8 @@ WavelengthInterval wavelength_interval(Path path, float lo, float hi) {
     interval.cell_lo = emission_cell(lo);
     interval.cell_hi = emission_cell(hi);
     interval.through = path.walk.inverse_pdf * transmitted(path, 0.5 * (lo + hi));
-    if (ABSORPTION || HAS_FILM) {
-        interval.steps = max(1, int(ceil((hi - lo) * float(TINT_STEPS))));
-    } else {
-        interval.steps =
-            path.throughput.x == path.throughput.z ? 1 : max(1, int(ceil((hi - lo) * float(WEIGHT_STEPS))));
-    }
+    bool bends = ABSORPTION || HAS_FILM, even = !bends && path.throughput.x == path.throughput.z;
+    interval.steps = even ? 1 : max(1, int(ceil((hi - lo) * float(bends ? TINT_STEPS : WEIGHT_STEPS))));
     return interval;
 }
 

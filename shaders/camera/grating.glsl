@@ -9,36 +9,16 @@
 // exceed the sample's limit of events.
 #define MIN_ORDER_SHARE 0.02
 
-// Direction of the light that comes back along an order of a camera path, as of `in_lines`; `step`: of the order.
-vec3 light_along(GratingEvent met, vec3 direction, float step) {
-    vec3 sent = in_lines(met, direction) + vec3(step, 0.0, 0.0);
-    float cosine = met.side * sqrt(max(1.0 - dot(sent.xy, sent.xy), 0.0));
-    return vec3(-sent.xy, is_reflective(met.grating) ? -cosine : cosine);
-}
-
-// Shares that light has left over the band of a path which goes on in an order, met the other way round.
-vec3 order_shares(GratingEvent met, GratingOrder order, uint number, Path path, vec3 steps) {
-    if (GRATING_PROFILES && met.grating.profile != 0u) {
-        vec3 low = light_along(met, direction_at_end(path, 0), steps.x);
-        vec3 high = light_along(met, direction_at_end(path, 1), steps.z);
-        return vec3(order_share(met, order, number, low, path.band.x),
-            order_share(met, order, number, light_along(met, path.direction, steps.y), path.band.y),
-            order_share(met, order, number, high, path.band.z));
-    }
-    return vec3(order.efficiency);
-}
-
-// The same of order `k` of a path that has not chosen one yet.
+// Shares of order `k` of a path that has not chosen one yet.
 vec3 order_shares(GratingEvent met, uint k, Path path) {
-    GratingOrder order = order_at(met.row, k);
-    return order_shares(met, order, k, path, order_steps(order, met.object, met.medium, path.band));
+    return order_shares(met, order_at(met.row, k), k, path, path.band, false);
 }
 
 // How likely an order is chosen, in proportion: none that carries light at some wavelength is left out.
 float order_odds(GratingEvent met, uint k, Path path) {
     vec3 shares = order_shares(met, k, path);
     if (GRATING_PROFILES && met.grating.profile != 0u)
-        return dot(shares, vec3(0.25, 0.5, 0.25)) + 0.02 * order_at(met.row, k).efficiency;
+        return dot(shares, OVER_BAND) + 0.02 * order_at(met.row, k).efficiency;
     return shares.y;
 }
 
@@ -88,12 +68,10 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
     if (HAS_DISPERSION && banded.restricted == 0u) restrict_to_band(banded, pixel_key);
     uint end = alone ? number + 1u : orders;
     GratingOrder order;
-    vec3 steps;
     bvec3 passes = bvec3(false);
     for (; number < end; ++number) {
         order = order_drawn(met, number, p.sample_index, path.depth, hash_combine(pixel_key, 90u));
-        steps = order_steps(order, hit.object, met.medium, banded.band);
-        passes = order_passes(banded, event, met, steps);
+        passes = order_passes(met, order, banded);
         if (any(passes) && order.efficiency > 0.0) break;
     }
     if (number >= end) {
@@ -103,7 +81,7 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
     bool more = !alone && number + 1u < end, here = passes.y, cut = false;
     if (SPECTRAL_SWEEP) {
         if (!all(passes) && path.recut == 0u) {
-            float at = cell_border(evanescence_in_band(banded, event, met, order, passes));
+            float at = cell_border(evanescence_in_band(met, order, banded, passes));
             Path start = start_of_band(whole, banded);
             cut = may_cut_near(start, at, hit.distance);
             if (cut) {
@@ -127,16 +105,11 @@ void meet_grating(inout Path path, Path whole, Hit hit, Event event, uint pixel_
         if (!here) path.walk.inverse_pdf = 0.0;
         return;
     }
-    vec3 shares = order_shares(met, order, number, banded, steps);
-    float share = shares.y;
-    if (order.shift_per_um != 0.0) path = banded;
-    if (GRATING_PROFILES && met.grating.profile != 0u) {
-        path = banded;
-        share = dot(shares, vec3(0.25, 0.5, 0.25));
-    }
+    vec3 shares = order_shares(met, order, number, banded, banded.band, false);
+    if (order.shift_per_um != 0.0 || (GRATING_PROFILES && met.grating.profile != 0u)) path = banded;
     path.throughput *= shares;
-    path.walk.branch_weight *= share;
+    path.walk.branch_weight *= dot(shares, OVER_BAND);
     path.walk.key = hash_combine(path.walk.key, 16u + number);
-    diffract_path(path, event, met, order, steps, geometric);
+    diffract_path(path, event, met, order, geometric);
     leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
 }

@@ -14,6 +14,13 @@ void add_length(inout Path path, int absorber, float length) {
         if (i == absorber) path.walk.lengths[i] += length;
 }
 
+// What a surface lets through of what enters is counted as by coloured mirrors.
+void filter_path(inout Path path, Hit hit) {
+    vec4 passed = object_colours[hit.object];
+    add_length(path, int(passed.x), 1.0);
+    path.walk.branch_weight *= passed.y;
+}
+
 #include "camera/coat.glsl"
 
 // A path at the start of its flight, `whole`, as the band that it stands for by now, `banded`.
@@ -50,7 +57,6 @@ void send_on(inout Path path, Event event, vec3 share, vec3 unhidden) {
     }
 }
 
-#if HAS_FILM
 // Leaves a path what a film reflects or lets through of each part of the spectrum.
 void leave_film_share(inout Path path, Event event, bool reflects) {
     float from = 0.0;
@@ -66,7 +72,6 @@ void leave_film_share(inout Path path, Event event, bool reflects) {
         from = ends.z;
     }
 }
-#endif
 
 // Ends a weak path by chance; one that goes on stands for those that have ended.
 void play_roulette(inout Path path, uint pixel_key) {
@@ -125,64 +130,53 @@ void cross_glass(inout Path path, Path whole, Hit hit, uint kind, Event event, u
         path.walk.ground = mirrored.walk.ground = 1u;
     }
     bool reflects = total;
-    float likely = total ? 1.0 : dot(event.reflectance, vec3(0.25, 0.5, 0.25));
+    float likely = total ? 1.0 : dot(event.reflectance, OVER_BAND);
     vec3 let_through = transmittance_of(event);
-    if (FILM_MET(event) && !total) {
+    if (HAS_FILM && FILM_MET(event) && !total) {
         // What absorbs leaves less than all to both.
-        float onward = dot(let_through, vec3(0.25, 0.5, 0.25));
+        float onward = dot(let_through, OVER_BAND);
         likely = clamp(likely / max(likely + onward, 1e-9), 0.05, 0.95);
     }
     bool strong = !total
         && (begins || path.depth <= 1u || path.walk.branch_weight * min(likely, 1.0 - likely) > p.split_threshold);
     bool splits = strong && stack_size < STACK;
     if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
-    if (splits && (FILM_MET(event) || mirror.reflectance.y > 0.0)) {
+    if (splits && ((HAS_FILM && FILM_MET(event)) || mirror.reflectance.y > 0.0)) {
         mirrored.walk.branch_weight *= likely;
         mirrored.walk.key = hash_combine(mirrored.walk.key, 1u);
         leave_surface(mirrored, hit, !entering);
         vec3 unhidden = reflect_path(mirrored, mirror, geometric);
-#if HAS_FILM
-        if (FILM_MET(event)) {
+        if (HAS_FILM && FILM_MET(event)) {
             leave_film_share(mirrored, mirror, true);
             mirror.reflectance = vec3(1.0);
         }
-#endif
         send_on(mirrored, mirror, mirror.reflectance, unhidden);
         if (RANDOM_WAVELENGTH) play_roulette(mirrored, pixel_key);
         if (mirrored.walk.inverse_pdf > 0.0) push(mirrored);
     }
     vec3 share = total ? vec3(1.0) : let_through, reflected = event.reflectance;
-    if (FILM_MET(event)) share = reflected = vec3(1.0);
+    if (HAS_FILM && FILM_MET(event)) share = reflected = vec3(1.0);
     if (!total && !splits) {
         reflects = choice(path, pixel_key) < likely;
         share = (reflects ? reflected : share) / (reflects ? likely : 1.0 - likely);
         path.walk.key = hash_combine(path.walk.key, reflects ? 3u : 4u);
     } else
         path.walk.branch_weight *= total ? 1.0 : 1.0 - likely;
-#if HAS_FILM
     // Where only the facet's normal forbids it to go on, all of it is reflected.
-    if (FILM_MET(event) && (!total || event.cosine2.y <= 0.0)) leave_film_share(path, event, reflects);
-#endif
+    if (HAS_FILM && FILM_MET(event) && (!total || event.cosine2.y <= 0.0)) leave_film_share(path, event, reflects);
     vec3 unhidden;
     if (reflects)
         unhidden = reflect_path(path, event, geometric);
     else {
         unhidden = refract_path(path, event);
-        if (SURFACE_FILTERS) {
-            // What the surface lets through of what enters is counted as by coloured mirrors.
-            vec4 passed = object_colours[hit.object];
-            add_length(path, int(passed.x), 1.0);
-            path.walk.branch_weight *= passed.y;
-        }
+        if (SURFACE_FILTERS) filter_path(path, hit);
     }
     send_on(path, event, share, unhidden);
     if (RANDOM_WAVELENGTH) play_roulette(path, pixel_key);
     leave_surface(path, hit, reflects != entering);
 }
 
-#if HAS_CRYSTAL || HAS_POLARISER
 #include "camera/crystal.glsl"
-#endif
 
 // A specular surface, or a coat.
 void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
@@ -212,9 +206,7 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
         MicrofacetDraw(p.sample_index, path.depth, hash_combine(pixel_key, 80u)));
     if (HAS_MIRROR && kind == KIND_MIRROR) {
         bool geometric;
-#if HAS_FILM
-        if (FILM_MET(event)) leave_film_share(path, event, true);
-#endif
+        if (HAS_FILM && FILM_MET(event)) leave_film_share(path, event, true);
         reflect_path(path, event, geometric);
         leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
         vec3 colour = object_colours[hit.object].rgb;

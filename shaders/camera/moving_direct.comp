@@ -126,11 +126,8 @@ void main() {
         if (HAS_RECEIVERS) {
             // By all of them: a software renderer runs what an `if` leaves out, too.
             vec4 texel = between(texels, share), by_caustic = caustic(look, texel.xy / texel.z);
-            if (COATS || ROUGH_DIFFUSE) {
-                if (even && look.covered) found += by_caustic * vec4(albedo_of(pixel, first), 1.0);
-            } else {
-                if (even && look.covered) found += by_caustic;
-            }
+            if (even && look.covered)
+                found += COATS || ROUGH_DIFFUSE ? by_caustic * vec4(albedo_of(pixel, first), 1.0) : by_caustic;
         }
         if (!even && inside) {
             bool specular = is_specular(kind_of(first));

@@ -22,16 +22,13 @@ struct Walk {
     uint ground;  // 1: a rough surface has turned it, and its pixel's columns are as broad as the lobe, which samples
                   // share out
     float coat_pdf;  // of its direction, where it comes from a coat: density by steradian; else 0
-#if HAS_FILM
     // What thin films have left of FILM_PARTS parts of the spectrum, two halves a word: an array would lie in memory.
     uvec4 films_a, films_b, films_c;
-#endif
     float lengths[ABSORBERS];  // way through each absorbing glass, GPU units; reflections by each coloured mirror
 };
 
 #include "path/path.glsl"
 
-#if HAS_FILM
 #define FILM_PARTS 24
 
 void begin_films(inout Walk walk) { walk.films_a = walk.films_b = walk.films_c = uvec4(packHalf2x16(vec2(1.0))); }
@@ -59,7 +56,6 @@ float left_by_films(Walk walk, float x) {
     float slope = film_part(walk, min(part + 1, FILM_PARTS - 1)) - film_part(walk, max(part - 1, 0));
     return max(film_part(walk, part) + 0.5 * slope * (at - float(part) - 0.5), 0.0);
 }
-#endif
 
 // Counts the looks of a pixel: each sees another point of a light.
 uint look_index;
@@ -67,11 +63,8 @@ uint look_index;
 
 // Side of the share of its pixel that a sample of this path has, pixels.
 float sample_side(Path path) {
-    if (LISTS_SPECULAR) {
-        return p.sample_side * inversesqrt(float(p.primary_samples));
-    } else {
-        return path.restricted != 0u ? p.band_side : p.sample_side;
-    }
+    return LISTS_SPECULAR ? p.sample_side * inversesqrt(float(p.primary_samples))
+                          : (path.restricted != 0u ? p.band_side : p.sample_side);
 }
 
 // How much of what looks bright in the whole spectrum lies below either end of a band.

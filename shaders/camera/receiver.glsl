@@ -261,12 +261,9 @@ Steady steady_lights(SurfaceInteraction seen, vec3 lo, vec3 hi, uint pixel_key) 
 
 // A map's channels are XYZ (lm) where the picture's are linear Rec.709, else the same bins.
 vec4 map_to_channels(vec4 texel) {
-    if (RGB_CHANNELS) {
-        return vec4(dot(p.red_of_xyz.xyz, texel.xyz), dot(p.green_of_xyz.xyz, texel.xyz),
-            dot(p.blue_of_xyz.xyz, texel.xyz), 0.0);
-    } else {
-        return texel;
-    }
+    return RGB_CHANNELS ? vec4(dot(p.red_of_xyz.xyz, texel.xyz), dot(p.green_of_xyz.xyz, texel.xyz),
+                              dot(p.blue_of_xyz.xyz, texel.xyz), 0.0)
+                        : texel;
 }
 
 // Texels that a lookup in a map averages along one side at most, and in all; what it covers beyond is met by the

@@ -57,9 +57,7 @@ Path path_from(uvec2 pixel, vec2 within_pixel, float gain) {
     path.walk.planar_so_far = 1u;
     if (ROUGH_SURFACES) path.walk.ground = 0u;
     if (COATS) path.walk.coat_pdf = 0.0;
-#if HAS_FILM
-    begin_films(path.walk);
-#endif
+    if (HAS_FILM) begin_films(path.walk);
     if (ABSORPTION) {
         for (int i = 0; i < ABSORBERS; ++i) path.walk.lengths[i] = 0.0;
     }

@@ -27,11 +27,8 @@ float sweep_pixels(Path path, float distance) {
 // The same in widths of what has to tell colours apart: a pixel, or of the lobe of a rough surface, which is many
 // pixels wide, a sample's share.
 float shown_sweep(Path path, float distance) {
-    if (ROUGH_SURFACES) {
-        return sweep_pixels(path, distance) / (path.walk.ground != 0u ? sample_side(path) : 1.0);
-    } else {
-        return sweep_pixels(path, distance);
-    }
+    return ROUGH_SURFACES ? (sweep_pixels(path, distance) / (path.walk.ground != 0u ? sample_side(path) : 1.0))
+                          : sweep_pixels(path, distance);
 }
 
 // Looks that this sweep needs: where it shows at all, one for either half; the fewer, the less of the sample the path
@@ -67,10 +64,9 @@ void add_sky(Path path, WavelengthInterval interval, vec3 direction, vec3 sweep)
     vec3 columns[3];
     columns[0] = sample_side(path) * path.ddirection[0];
     columns[1] = sample_side(path) * path.ddirection[1];
-    if (LENS) {
+    if (LENS)
         join_sides(path.direction, columns[0], columns[1], sample_side(path) * path.ddirection[LENS_COLUMNS],
             sample_side(path) * path.ddirection[LENS_COLUMNS + 1]);
-    }
     columns[2] = sweep;
     add_colour(path, interval, uint(WHITE_ROW), sky_colour(direction, columns));
 }

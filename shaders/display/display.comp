@@ -67,11 +67,8 @@ vec3 toned(vec3 colour) {
         return tone_spectrasplat(colour);
     } else if (TONE_ACES) {
         return tone_aces(colour);
-    } else if (TONE_REINHARD) {
-        return tone_reinhard(colour);
-    } else {
-        return clamp(colour, 0.0, 1.0);
-    }
+    } else
+        return TONE_REINHARD ? tone_reinhard(colour) : clamp(colour, 0.0, 1.0);
 }
 
 // What the picture has beside a pixel, so many of the larger of its pixels and the output's away; the border's go on

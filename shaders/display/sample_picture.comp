@@ -6,9 +6,7 @@ uniform ivec2 lattice;
 
 void main() {
     int index = int(gl_GlobalInvocationID.x);
-    if (index >= lattice.x * lattice.y) {
-        return;
-    }
+    if (index >= lattice.x * lattice.y) return;
     ivec2 cell = ivec2(index % lattice.x, index / lattice.x);
     ivec2 size = textureSize(picture, 0);
     // The middle of the cell: the same pixels every time, so that an automatic exposure stands still.

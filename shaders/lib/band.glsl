@@ -12,6 +12,9 @@
 // Halvings of half a band: finer than float32 knows where cosines vanish.
 #define ONSET_HALVINGS 18
 
+// What weights at the three places of a band have in their mean over it.
+#define OVER_BAND vec3(0.25, 0.5, 0.25)
+
 // Weight at a place x of a band, straight between the three known ones.
 float band_weight(vec3 band, vec3 weight, float x) {
     float below = clamp((x - band.x) / max(band.y - band.x, 1e-9), 0.0, 1.0);

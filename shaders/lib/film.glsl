@@ -51,7 +51,7 @@ vec3 film_over(uint rows, vec3 cosine, vec3 x, bool single) {
 // Shares over a band, none below 0 or above 1: nearer to their mean where some were, which clamping would move.
 vec3 within_shares(vec3 shares, bool single) {
     if ((HERO || GATHERED_SPECTRUM) && single) return clamp(shares, 0.0, 1.0);
-    float mean = clamp(dot(shares, vec3(0.25, 0.5, 0.25)), 0.0, 1.0);
+    float mean = clamp(dot(shares, OVER_BAND), 0.0, 1.0);
     vec3 off = shares - mean, room = abs(step(0.0, off) - mean) / max(abs(off), 1e-9);
     return mean + off * min(1.0, min(room.x, min(room.y, room.z)));
 }

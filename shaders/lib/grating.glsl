@@ -72,92 +72,77 @@ float place_on_line(float draw) {
     return draw < 0.5 ? -place : place;
 }
 
-// The steps m λ / (Λ n) of an order at three places of a band, in the medium that the ray is in.
-vec3 order_steps(GratingOrder order, uint grating, uint medium, vec3 x) {
-    vec3 wavelength_um = vec3(medium_index(grating, x.x), medium_index(grating, x.y), medium_index(grating, x.z));
-    vec3 n = vec3(medium_index(medium, x.x), medium_index(medium, x.y), medium_index(medium, x.z));
-    return order.shift_per_um * wavelength_um / n;
+// What a path meets at a grating, for all its orders.
+struct GratingEvent {
+    Grating grating;
+    uint row;
+    uint object;
+    uint medium;  // that the path is in
+    float side;
+    vec3 normal, across;  // of the frame; unit, in the surface across the lines
+};
+
+// The step m λ / (Λ n) of an order, in the medium that the ray is in.
+float order_step(GratingEvent met, GratingOrder order, float x) {
+    return order.shift_per_um * medium_index(met.object, x) / medium_index(met.medium, x);
 }
 
 // d(step) / d(variable of group g): of the wavelength, and of the index of the medium.
-float order_step_derivative(GratingOrder order, uint grating, uint medium, uint g, float x) {
-    float n = medium_index(medium, x), derivative = 0.0;
-    if (object_at(grating).group == g) derivative += medium_slope(grating, x) / n;
-    if (medium != NONE && object_at(medium).group == g)
-        derivative -= medium_index(grating, x) / (n * n) * medium_slope(medium, x);
-    return order.shift_per_um * derivative;
+float order_step_derivative(GratingEvent met, GratingOrder order, uint g, float x) {
+    float n = medium_index(met.medium, x);
+    return order.shift_per_um
+        * (index_slope(met.object, g, x) / n - medium_index(met.object, x) / (n * n) * index_slope(met.medium, g, x));
 }
 
 // Unit vector in the surface across the lines: positive orders lean towards lines × outward normal.
-vec3 across_lines(vec3 normal, vec3 lines, float side) { return side * normalize(cross(lines, normal)); }
+vec3 across_lines(GratingEvent met, vec3 normal) { return met.side * normalize(cross(met.grating.lines, normal)); }
 
 // Squared cosine of the angle that an order leaves at; <= 0: it is evanescent. `shift` lies in the surface.
 float diffracted_cosine2(vec3 direction, float theta, vec3 shift) {
     return theta * theta - dot(shift, 2.0 * direction + shift);
 }
 
-vec3 diffract_direction(vec3 direction, vec3 normal, float theta, vec3 shift, float omega, bool reflects) {
-    return direction + shift + ((reflects ? omega : -omega) - theta) * normal;
+// Diffracted by a normal; `omega`: the cosine of the angle that it leaves at.
+vec3 diffract_direction(
+    GratingEvent met, vec3 direction, vec3 normal, float step, out float theta, out float cosine2, out float omega) {
+    vec3 shift = step * across_lines(met, normal);
+    theta = dot(direction, normal);
+    cosine2 = diffracted_cosine2(direction, theta, shift);
+    omega = sqrt(max(cosine2, 1e-12));
+    return direction + shift + ((is_reflective(met.grating) ? omega : -omega) - theta) * normal;
 }
 
 // Diffracted by the shading normal, or by the facet's where that would lead to the wrong side.
-Deflection diffract_at(ShadingFrame frame, vec3 direction, vec3 lines, float side, float step, bool reflects) {
-    vec3 normal = frame.normal, turned = direction;
-    float theta, cosine2, omega;
-    bool geometric = false;
+Deflection diffract_at(GratingEvent met, ShadingFrame frame, vec3 direction, float step) {
+    Deflection turned;
+    turned.normal = frame.normal;
+    turned.geometric = false;
+    float cosine2;
     for (int i = 0; i < 2; ++i) {
-        vec3 shift = step * across_lines(normal, lines, side);
-        theta = dot(direction, normal);
-        cosine2 = diffracted_cosine2(direction, theta, shift);
-        omega = sqrt(max(cosine2, 1e-12));
-        turned = diffract_direction(direction, normal, theta, shift, omega, reflects);
-        bool wrong = dot(turned, frame.normal_g) * (reflects ? 1.0 : -1.0) <= 0.0;
-        if (frame.interpolated == 0u || !wrong || geometric) break;
-        geometric = true;
-        normal = frame.normal_g;
+        vec3 sent = diffract_direction(met, direction, turned.normal, step, turned.theta, cosine2, turned.omega);
+        turned.direction = normalize(sent);
+        bool wrong = dot(sent, frame.normal_g) * (is_reflective(met.grating) ? 1.0 : -1.0) <= 0.0;
+        if (frame.interpolated == 0u || !wrong || turned.geometric) break;
+        turned.geometric = true;
+        turned.normal = frame.normal_g;
     }
-    return Deflection(normalize(turned), normal, theta, omega, geometric, cosine2 > 0.0);
+    turned.exists = cosine2 > 0.0;
+    return turned;
 }
 
 // Derivative of the diffracted direction by one column of the incident ray: the tangential part's changes are handed
-// on, the normal part follows by differentiation. `dstep`: explicit derivative of the step along this column.
-vec3 diffract_column(vec3 direction, vec3 ddirection, vec3 normal, vec3 dnormal, float theta, float omega, vec3 lines,
-    float side, float step, float dstep, bool reflects) {
-    vec3 across = across_lines(normal, lines, side);
-    vec3 shift = step * across;
-    vec3 dshift = dstep * across;
-    if (NORMAL_DERIVATIVES) dshift += step * side * normalised_derivative(cross(lines, normal), cross(lines, dnormal));
-    float dtheta = dot(ddirection, normal) + dot(direction, dnormal);
-    float domega = (theta * dtheta - dot(dshift, direction + shift) - dot(shift, ddirection)) / omega;
-    float sense = reflects ? 1.0 : -1.0;
-    return ddirection + dshift + (sense * domega - dtheta) * normal + (sense * omega - theta) * dnormal;
-}
-
-vec3 diffracted_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal, vec3 lines, float side,
-    float step, float dstep, bool reflects) {
-    vec3 judged = turned.geometric ? vec3(0.0) : dnormal;
-    return diffract_column(
-        direction, ddirection, turned.normal, judged, turned.theta, turned.omega, lines, side, step, dstep, reflects);
-}
-
-// The place in the band where an order becomes evanescent, in the half whose ends `passes` tells apart. The direction
-// changes by `columns` a unit of each group's variable; `bends`: what it is off that at either end.
-float evanescence_onset(vec3 band, vec3 direction, vec3 columns[SPECTRAL_GROUPS], vec3 bends[2], vec3 normal,
-    vec3 lines, float side, GratingOrder order, uint grating, uint medium, bvec3 passes) {
-    bool low_side = passes.x != passes.y;
-    float a = low_side ? band.x : band.y, b = low_side ? band.y : band.z;
-    bool passes_a = low_side ? passes.x : passes.y;
-    float per_reach = 1.0 / max(b - a, 1e-9);
-    vec3 across = across_lines(normal, lines, side);
-    for (int i = 0; i < ONSET_HALVINGS; ++i) {
-        float x = 0.5 * (a + b), reach = (x - band.y) * per_reach;
-        vec3 direction_x = direction + reach * reach * bends[low_side ? 0 : 1];
-        for (int g = 0; g < SPECTRAL_GROUPS; ++g) direction_x += columns[g] * variable_step(uint(g), x, band.y);
-        direction_x = normalize(direction_x);
-        vec3 shift = order_steps(order, grating, medium, vec3(x)).x * across;
-        bool passes_x = diffracted_cosine2(direction_x, dot(direction_x, normal), shift) > 0.0;
-        a = passes_x == passes_a ? x : a;
-        b = passes_x == passes_a ? b : x;
-    }
-    return 0.5 * (a + b);
+// on, the normal part follows by differentiation. `dnormal`: of the frame; `dstep`: explicit derivative of the step
+// along this column.
+vec3 diffracted_column(
+    GratingEvent met, Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal, float step, float dstep) {
+    if (turned.geometric) dnormal = vec3(0.0);
+    vec3 across = across_lines(met, turned.normal), shift = step * across, dshift = dstep * across;
+    if (NORMAL_DERIVATIVES)
+        dshift += step * met.side
+            * normalised_derivative(cross(met.grating.lines, turned.normal), cross(met.grating.lines, dnormal));
+    float dtheta = dot(ddirection, turned.normal) + dot(direction, dnormal);
+    float domega = (turned.theta * dtheta - dot(dshift, direction + shift) - dot(shift, ddirection)) / turned.omega;
+    float sense = is_reflective(met.grating) ? 1.0 : -1.0;
+    return ddirection + dshift + (sense * domega - dtheta) * turned.normal
+        + (sense * turned.omega - turned.theta) * dnormal;
 }

@@ -37,10 +37,9 @@ struct Deflection {
 void curve_as_piece(Hit hit, bool entering, vec3 position, inout ShadingFrame frame) {
     Piece piece = piece_at(hit.primitive & ~CURVED_BIT);
     frame.interpolated = 1u - piece.is_plane;
-    if (NORMAL_DERIVATIVES) {
+    if (NORMAL_DERIVATIVES)
         curve_of_piece(piece, position, entering ? 1.0 : -1.0, frame.summed, frame.gradient_u, frame.gradient_v,
             frame.along_u, frame.along_v);
-    }
 }
 
 // `position`: the place of the hit.

@@ -83,11 +83,7 @@ bool accept_hit(float distance, float facing, uint object, RayOrigin origin) {
 // Touching solids: of two crossings at one place the entering one comes first, so that no film of
 // air appears between them.
 float crossing_key(float distance, float facing) {
-    if (MEDIUM_STACK) {
-        return facing > 0.0 ? distance + NEAR_DISTANCE : distance;
-    } else {
-        return distance;
-    }
+    return MEDIUM_STACK ? (facing > 0.0 ? distance + NEAR_DISTANCE : distance) : distance;
 }
 
 // Surfaces in contact are one interface, and what light passes gives way to what it ends at or is thrown back by:

@@ -24,11 +24,7 @@ const uint stack_objects[STACK_SIZE] = STACK_OBJECTS;
 uint medium_of(uint mask) { return mask == 0u ? NONE : stack_objects[findMSB(mask)]; }
 
 bool is_inside(MediumStack stack) {
-    if (MEDIUM_STACK) {
-        return stack.mask != 0u || stack.object != NONE;
-    } else {
-        return stack.object != NONE;
-    }
+    return MEDIUM_STACK ? stack.mask != 0u || stack.object != NONE : stack.object != NONE;
 }
 
 // Object whose medium fills the place, NONE: air.
@@ -126,23 +122,15 @@ bool meets_crystal(MediumInterface boundary) {
     return solid && (crystal_of(boundary.before) != NONE || crystal_of(boundary.after) != NONE);
 }
 
-// dn/dvar of an object's glass: 1 where the variable is its own index.
-float medium_slope(uint object, float x) {
-    if (MERGED_GROUPS) {
-        return spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x);
-    } else {
-        return 1.0;
-    }
+// d(index) / d(variable of group g) of an object's medium: 1 where the variable is its own index.
+float index_slope(uint object, uint g, float x) {
+    if (object == NONE || object_at(object).group != g) return 0.0;
+    return MERGED_GROUPS ? spectral_row(uint(SLOPE_ROW) + object_at(object).medium, x) : 1.0;
 }
 
 // d(n_i / n_t) / d(variable of group g) [physics: -eta/n_t for the transmitting glass, 1/n_t for the
 // incident one].
 float index_ratio_derivative(MediumInterface boundary, uint g, float x, float n_i, float n_t) {
-    float derivative = 0.0;
-    if (IS_THIN(boundary)) return derivative;
-    if (boundary.after != NONE && object_at(boundary.after).group == g)
-        derivative -= n_i / (n_t * n_t) * medium_slope(boundary.after, x);
-    if (boundary.before != NONE && object_at(boundary.before).group == g)
-        derivative += medium_slope(boundary.before, x) / n_t;
-    return derivative;
+    if (IS_THIN(boundary)) return 0.0;
+    return index_slope(boundary.before, g, x) / n_t - n_i / (n_t * n_t) * index_slope(boundary.after, g, x);
 }

@@ -79,12 +79,10 @@ FresnelPair fresnel_reflection(vec3 theta, vec3 eta_it, vec3 cosine2_t) {
         mix((x * x - y * y) * per, rs * rp, passes), mix(2.0 * x * y * per, vec3(0.0), passes));
 }
 
-#if HAS_SHEET
 FresnelPair both_faces(FresnelPair one) {
     vec3 s = both_faces(one.s), p = both_faces(one.p);
     return FresnelPair(s, p, sign(one.real) * sqrt(s * p), vec3(0.0));
 }
-#endif
 
 // What is not reflected: both amplitudes are real and positive then.
 FresnelPair fresnel_transmission(FresnelPair reflection) {

@@ -10,11 +10,7 @@
 #define KIND_GRATING 4u
 #define KIND_SHEET 5u
 #define KIND_POLARISER 6u
-#if HAS_SHEET
-#define IS_GLASS(kind) (kind == KIND_DIELECTRIC || kind == KIND_SHEET)
-#else
-#define IS_GLASS(kind) (kind == KIND_DIELECTRIC)
-#endif
+#define IS_GLASS(kind) (kind == KIND_DIELECTRIC || (HAS_SHEET && kind == KIND_SHEET))
 
 // Paths go on from it.
 bool is_specular(uint kind) {
@@ -62,11 +58,8 @@ vec3 corner_normal(uint corner) { return uintBitsToFloat(scene_texel(uint(NORMAL
 
 // Samples `cell` and cell + 1 of a spectral table's row.
 vec2 spectral_pair(uint row, int cell) {
-    if (SCENE_IMAGE) {
-        return imageLoad(spectra, ivec2(cell, int(row))).xy;
-    } else {
-        return texelFetch(spectra, ivec2(cell, int(row)), 0).xy;
-    }
+    return SCENE_IMAGE ? imageLoad(spectra, ivec2(cell, int(row))).xy
+                       : texelFetch(spectra, ivec2(cell, int(row)), 0).xy;
 }
 
 // A spectral table's row at the spectral coordinate x, linear between samples.

@@ -7,9 +7,7 @@ uniform int first_row;
 
 void main() {
     ivec2 at = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, first_row);
-    if (any(greaterThanEqual(at, imageSize(total)))) {
-        return;
-    }
+    if (any(greaterThanEqual(at, imageSize(total)))) return;
     vec4 added = imageLoad(scratch, at);
     // Most of a map is dark.
     if (any(notEqual(added, vec4(0.0)))) {

@@ -40,9 +40,7 @@ vec3 to_world(vec3 local) { return local.x * p.tangent + local.y * p.bitangent +
 void main() {
     uint k = gl_GlobalInvocationID.x;
     bool is_there = k < p.count;
-#ifndef RAY_POOL
-    if (!is_there) return;
-#endif
+    if (!RAY_POOL && !is_there) return;
     // Every band, and every point on an extended light, has a regular lattice of its own, shifted
     // against the others: a lattice whose points jittered over the light would be noise.
     uint lattices = p.band_count * p.light_points;
@@ -157,11 +155,9 @@ void main() {
         ray.x_anchor = band.z;
         if (RANDOM_WAVELENGTH) {
             // By brightness within the band; a laser's band has no width, and its photons all have its wavelength.
-#ifdef EVEN_WAVELENGTHS
-            float place_in_band = kronecker(id, 3774877043u, p.shift_spectral);
-#else
-            float place_in_band = unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
-#endif
+            float place_in_band = EVEN_WAVELENGTHS
+                ? kronecker(id, 3774877043u, p.shift_spectral)
+                : unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
             float per_density = 1.0;
             if (band.y > band.x)
                 ray.x_anchor = drawn_wavelength(uint(BRIGHTNESS_ROW) + p.light, band.xy, place_in_band, per_density);
@@ -205,9 +201,7 @@ void main() {
         ray.inside_mask = 0u;
         ray.inside_object = 0xffffffffu;
         if (FLIGHTS) ray.flown = vec4(0.0);
-#ifdef TINT_LEVELS
-        ray.tinted = vec4(0.0);
-#endif
+        if (TINT_LEVELS > 0) ray.tinted = vec4(0.0);
         if (COLUMNS > 0) {
             for (int c = 0; c < COLUMNS; ++c) {
                 ray.dposition[c] = vec4(0.0);

@@ -20,12 +20,8 @@ struct Walk {
     uint taps;  // bits of the wavelengths that the anchor still represents
 };
 #include "path/event.glsl"
-#if HAS_CRYSTAL
 #include "path/crystal.glsl"
-#endif
-#if HAS_POLARISER
 #include "path/polariser.glsl"
-#endif
 
 struct FollowedRay {
     Path path;
@@ -57,7 +53,6 @@ void keep_anchor(inout Path path) {
     for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= represented(path.walk.taps, t);
 }
 
-#if HAS_FILM
 // What a film reflects or lets through about red, green and blue.
 vec3 film_lobe(Path path, Event event, bool reflects) {
     vec3 x = path.walk.x[0], high = vec3(1.0, 0.5 * (x.xy + x.yz)), low = vec3(high.yz, 0.0), found;
@@ -66,7 +61,6 @@ vec3 film_lobe(Path path, Event event, bool reflects) {
     for (int c = 0; c < 3; ++c) found[c] = film_between(event.film, reflects, event.film.cosine.y, q, low[c], high[c]);
     return found;
 }
-#endif
 
 // What glass reflects and lets through at all wavelengths that a path represents.
 struct Spectrum {
@@ -101,24 +95,16 @@ void weigh_spectrum(inout Path path, Spectrum spectrum, bool passes, float chanc
     if (passes) path.walk.taps = spectrum.passing;
 }
 
-#if HAS_CRYSTAL
 // A ray into one of a crystal's lobes, by chance; the anchor alone goes on. Whether it went through.
 bool follow_lobe(inout Path path, Event event, uint filter_row, float draw) {
     if (GATHERED_SPECTRUM) keep_anchor(path);
     CrystalEvent met = crystal_event(path, event);
-    uint chosen = 0u;
-    float below = 0.0;
-    for (uint lobe = 0u; lobe < MOST_LOBES; ++lobe) {
-        float share = lobe_share(met, lobe).y;
-        if (share > 0.0 && below <= draw) chosen = lobe;
-        below += share;
-    }
+    uint chosen = chosen_lobe(met.shares[1], draw);
     bool onward = (chosen & LOBE_ONWARD) != 0u, geometric;
     turn_crystal(path, event, met, chosen, geometric);
     if (SURFACE_FILTERS && onward && filter_row != NONE) tint_by(path.walk, uint(WEIGHT_ROW) + filter_row, -1.0);
     return onward;
 }
-#endif
 
 // `walk`: with its wavelengths; `x_anchor`: one of them, or that of the index. `lost`: 1 where the ray was given up
 // after MAX_EVENTS.
@@ -159,38 +145,30 @@ FollowedRay follow_specular(
             bool passes = false, changes = true, geometric;
             vec3 unhidden = vec3(1.0);
             if (HAS_MIRROR && kind == KIND_MIRROR) tint_by(path.walk, uint(WEIGHT_ROW) + thing.weight_row, -1.0);
-#if HAS_FILM
-            if (HAS_MIRROR && kind == KIND_MIRROR && FILM_MET(event)) {
+            if (HAS_FILM && HAS_MIRROR && kind == KIND_MIRROR && FILM_MET(event)) {
                 for (int t = 0; t < TINTS; ++t)
                     path.walk.tint[t] *= GATHERED_SPECTRUM ? event_for(path, event, kind, path.walk.x[t]).reflectance
                                                            : film_lobe(path, event, true);
             }
-#endif
             bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
-#if HAS_CRYSTAL
-            if (parts_waves) passes = follow_lobe(path, event, thing.texture, unit_float(hash_combine(key, number)));
-#endif
-#if HAS_POLARISER
-            if (kind == KIND_POLARISER) {
+            if (HAS_CRYSTAL && parts_waves)
+                passes = follow_lobe(path, event, thing.texture, unit_float(hash_combine(key, number)));
+            if (HAS_POLARISER && kind == KIND_POLARISER) {
                 if (GATHERED_SPECTRUM && thing.medium != NONE) keep_anchor(path);
                 float share = pass_polariser(path, crystal_at(thing.receiver)).y;
                 for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= share;
                 passes = true;
             }
-#endif
             if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) {
                 changes = event.boundary.changes;
                 float chance = event.reflectance.y;
                 Spectrum spectrum;
-#if HAS_FILM
-                bool by_film = FILM_MET(event) && !GATHERED_SPECTRUM && event.refracted.exists;
-                if (by_film) chance = clamp(dot(film_lobe(path, event, true), vec3(1.0 / 3.0)), 0.05, 0.95);
-#endif
+                bool by_film = HAS_FILM && !GATHERED_SPECTRUM && FILM_MET(event) && event.refracted.exists;
+                if (HAS_FILM && by_film) chance = clamp(dot(film_lobe(path, event, true), vec3(1.0 / 3.0)), 0.05, 0.95);
                 if (GATHERED_SPECTRUM && changes) chance = reflect_spectrum(path, event, kind, spectrum);
                 passes = !changes || (event.cosine2.y > 0.0 && unit_float(hash_combine(key, number)) >= chance);
-#if HAS_FILM
-                if (by_film) path.walk.tint[0] *= film_lobe(path, event, !passes) / (passes ? 1.0 - chance : chance);
-#endif
+                if (HAS_FILM && by_film)
+                    path.walk.tint[0] *= film_lobe(path, event, !passes) / (passes ? 1.0 - chance : chance);
                 if (GATHERED_SPECTRUM && changes) weigh_spectrum(path, spectrum, passes, chance);
                 if (!changes)
                     path.medium = event.boundary.behind;

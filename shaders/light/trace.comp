@@ -189,10 +189,8 @@ bool is_beam_object(uint object) {
 // The ray's way to what it meets; it has come so far through haze then.
 Flight flight_of(inout Path path, float distance) {
     bool outside = !is_inside(path.medium);
-    if (HAS_GRATING || HAS_CRYSTAL) {
-        // What is left of a grating's orders, or a crystal's lobes, has flown here before.
-        outside = outside && path.order == 0u;
-    }
+    // What is left of a grating's orders, or a crystal's lobes, has flown here before.
+    if (HAS_GRATING || HAS_CRYSTAL) outside = outside && path.order == 0u;
     Flight flight;
     flight.position = path.position;
     flight.direction = path.direction;
@@ -220,9 +218,7 @@ Flight flight_of(inout Path path, float distance) {
     return flight;
 }
 
-#if FLIGHTS
 Flight flight;
-#endif
 
 #define ENDED 0u
 #define LANDS 1u
@@ -254,9 +250,7 @@ uint arrive(uint slot, out Arrival at, out Outcome outcome) {
     Triangle facet = hit_triangle(hit);
     uint kind = met ? thing.kind : NONE;
 
-#if FLIGHTS
-    flight = flight_of(path, met ? hit.distance : FAR_DISTANCE);
-#endif
+    if (FLIGHTS) flight = flight_of(path, met ? hit.distance : FAR_DISTANCE);
     if (ABSORPTION && met) absorb(path, hit.distance, outcome.absorbed_w);
     if (met) path.position = surface_point(hit, facet, path.position, path.direction);
     if (FOOTPRINTS && path.depth > 0u) keep_directions_within(path);
@@ -291,12 +285,9 @@ void go_past(Arrival at, uint k, inout Outcome outcome) {
     }
 }
 
-#if FLIGHTS
 void note_flight(Arrival at, uint k, Outcome outcome) {
-    if (BAND_CUTS) {
-        // The parts of a band that is cut fly again.
-        if ((outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
-    }
+    // The parts of a band that is cut fly again.
+    if (BAND_CUTS && (outcome.what & FELL_BAND) != 0u) flight.flux_w = 0.0;
     flight.what |= at.kind == KIND_DIFFUSE || at.kind == KIND_BLACK || at.kind == NONE ? 0u : 1u;
 #ifndef RAY_POOL
     store_flight(state.flights - state.alive + k, flight);
@@ -304,7 +295,6 @@ void note_flight(Arrival at, uint k, Outcome outcome) {
     if (outcome.what != WAITS) store_flight(atomicAdd(state.flights, 1u), flight);
 #endif
 }
-#endif
 
 // An event of the ray in `slot`; `k` says where what it leaves goes.
 void follow(uint slot, uint k, out Outcome outcome) {
@@ -314,9 +304,7 @@ void follow(uint slot, uint k, out Outcome outcome) {
         land(at, k, outcome);
     else if (comes_to == GOES_ON)
         go_past(at, k, outcome);
-#if FLIGHTS
-    note_flight(at, k, outcome);
-#endif
+    if (FLIGHTS) note_flight(at, k, outcome);
 }
 
 void main() {

@@ -9,13 +9,7 @@ void weaken(inout Path path, vec3 share, vec3 companions) {
 }
 
 // A spectral table's values for the companions.
-vec3 companion_row(Path path, uint row) {
-    if (HERO) {
-        return spectral_row(row, path.walk.companion_x.xyz);
-    } else {
-        return vec3(1.0);
-    }
-}
+vec3 companion_row(Path path, uint row) { return HERO ? spectral_row(row, path.walk.companion_x.xyz) : vec3(1.0); }
 
 // The share of the hero and its companions together, by which roulette judges: whoever of them leads, the odds are the
 // same.
@@ -38,11 +32,9 @@ void leave_companions(inout Path path) {
 struct Companions {
     vec3 reflectance, transmittance;
     bool stay;  // with the hero where it is refracted: nothing disperses
-#if defined(HERO) && defined(POLARISED)
     vec3 s[3];
     Polarisation seen;
     FresnelPair reflection, transmission;
-#endif
 };
 
 // Their state counts from the hero's axis.
@@ -63,40 +55,39 @@ Companions companions_at(Path path, Event event, uint kind) {
     companions.reflectance = vec3(event.reflectance.y);
     companions.transmittance = transmittance_of(event).yyy;
     companions.stay = true;
-#ifdef HERO
-    if (POLARISED) {
-        companions.s = event.s;
-        companions.seen = event.seen = in_plane(companions_of(path), path.direction, event.s);
-    }
-    Event of = event;
-    of.theta = event.theta.yyy;
-    share_at(path.walk.companion_x.xyz, true, kind, of);
-    if (IS_GLASS(kind) || FILM_MET(event)) {
-        companions.reflectance = of.reflectance;
-        companions.transmittance = transmittance_of(of);
-    }
-    if (HAS_DIELECTRIC && IS_GLASS(kind)) {
-        bool polished = true;
-        if (ROUGH_SURFACES) polished = event.ground.width <= 0.0;
-        if (polished && !event.refracted.exists && event.cosine2.y > 0.0) {
-            companions.reflectance = vec3(1.0);
-            companions.transmittance = vec3(0.0);
+    if (HERO) {
+        if (POLARISED) {
+            companions.s = event.s;
+            companions.seen = event.seen = in_plane(companions_of(path), path.direction, event.s);
         }
-        companions.stay = all(lessThan(abs(of.n_i / of.n_t - event.n_i.y / event.n_t.y), vec3(1e-7)));
+        Event of = event;
+        of.theta = event.theta.yyy;
+        share_at(path.walk.companion_x.xyz, true, kind, of);
+        if (IS_GLASS(kind) || (HAS_FILM && FILM_MET(event))) {
+            companions.reflectance = of.reflectance;
+            companions.transmittance = transmittance_of(of);
+        }
+        if (HAS_DIELECTRIC && IS_GLASS(kind)) {
+            bool polished = true;
+            if (ROUGH_SURFACES) polished = event.ground.width <= 0.0;
+            if (polished && !event.refracted.exists && event.cosine2.y > 0.0) {
+                companions.reflectance = vec3(1.0);
+                companions.transmittance = vec3(0.0);
+            }
+            companions.stay = all(lessThan(abs(of.n_i / of.n_t - event.n_i.y / event.n_t.y), vec3(1e-7)));
+        }
+        if (POLARISED) {
+            companions.reflection = of.reflection;
+            companions.transmission = of.transmission;
+        }
     }
-    if (POLARISED) {
-        companions.reflection = of.reflection;
-        companions.transmission = of.transmission;
-    }
-#endif
     return companions;
 }
 
 // The companions' state behind what has turned the hero.
 void polarise_companions(inout Path child, Companions companions, bool refracts) {
-    if (HERO && POLARISED) {
+    if (HERO && POLARISED)
         keep_companions(child,
             out_of_plane(behind_interface(companions.seen, refracts ? companions.transmission : companions.reflection),
                 child.direction, companions.s));
-    }
 }

@@ -6,26 +6,17 @@
 bool part_in_crystal(Path path, Hit hit, Event event, uint filter_row, out Path child, inout Path rest,
     out bool rest_lives, inout Outcome outcome) {
     CrystalEvent met = crystal_event(path, event);
-    vec3 share = vec3(0.0), before = vec3(0.0), after = vec3(0.0);
-    uint chosen = MOST_LOBES;
-    for (uint lobe = min(path.order, MOST_LOBES); lobe < MOST_LOBES; ++lobe) {
-        vec3 of_lobe = lobe_share(met, lobe);
-        before += of_lobe;
-        if (chosen < MOST_LOBES) {
-            after += of_lobe;
-        } else if (of_lobe.y > 0.0) {
-            chosen = lobe;
-            share = of_lobe;
-        }
-    }
     // A lobe that the anchor does not have is none.
+    uvec4 lobes = uvec4(0u, 1u, 2u, 3u);
+    vec4 ahead = vec4(greaterThanEqual(lobes, uvec4(path.order)));
+    uint chosen = chosen_lobe(ahead * met.shares[1], 0.0);
+    vec4 behind = vec4(greaterThan(lobes, uvec4(chosen)));
+    vec3 per_left = 1.0 / max(ahead * met.shares, 1e-20), share = lobe_share(met, chosen) * per_left,
+         after = behind * met.shares * per_left;
     rest_lives = after.y > 0.0;
-    vec3 per_left = 1.0 / max(before, 1e-20);
-    share *= per_left;
-    after *= per_left;
     bool entering = dot(path.direction, hit.normal_g) < 0.0, onward = (chosen & LOBE_ONWARD) != 0u, geometric;
     child = child_of(path, hit, onward == entering);
-    if (chosen >= MOST_LOBES) {
+    if (share.y <= 0.0) {
         outcome.what |= LOST_NUMERIC;
         outcome.flux_w = carried_w(path);
         return false;

@@ -4,20 +4,6 @@
 // A grating of up to so many orders sends each on as a whole lattice where it is met first.
 #define MAX_WHOLE_ORDERS 3u
 
-// Shares of a path's light in an order, over x. `single`: of three wavelengths that are with the anchor.
-vec3 order_shares(GratingEvent met, GratingOrder order, uint number, Path path, vec3 x, bool single) {
-    if (GRATING_PROFILES && met.grating.profile != 0u) {
-        vec3 light = in_lines(met, path.direction), low = light, high = light;
-        if (SPECTRAL_GROUPS > 0 && !single) {
-            low = in_lines(met, direction_at_end(path, 0));
-            high = in_lines(met, direction_at_end(path, 1));
-        }
-        return vec3(order_share(met, order, number, low, x.x), order_share(met, order, number, light, x.y),
-            order_share(met, order, number, high, x.z));
-    }
-    return vec3(order.efficiency);
-}
-
 // What the orders before `number` leave of a path's light, over x.
 vec3 left_by_orders(GratingEvent met, uint number, Path path, vec3 x, bool single) {
     vec3 left = vec3(order_at(met.row, number).left);
@@ -28,17 +14,14 @@ vec3 left_by_orders(GratingEvent met, uint number, Path path, vec3 x, bool singl
     return max(left, 0.0);
 }
 
-// Shares of the light of a path that comes to the orders from `first` on: of order `number`, and what is left before
-// it.
-struct OrderShares {
-    vec3 kept, own;
-};
-
-OrderShares shares_from(GratingEvent met, uint first, uint number, Path path, vec3 x, bool single) {
+// Shares of the light of a path that comes to the orders from `first` on: of order `number`, `own`; and for those
+// behind it, or with it where the band is `cut`, `left`.
+void shares_from(
+    GratingEvent met, uint first, uint number, Path path, vec3 x, bool single, bool cut, out vec3 own, out vec3 left) {
     vec3 per_left = 1.0 / max(left_by_orders(met, first, path, x, single), 1e-9);
-    GratingOrder order = order_at(met.row, number);
-    return OrderShares(left_by_orders(met, number, path, x, single) * per_left,
-        order_shares(met, order, number, path, x, single) * per_left);
+    own = order_shares(met, order_at(met.row, number), number, path, x, single) * per_left;
+    left = left_by_orders(met, number, path, x, single) * per_left;
+    if (!cut) left = number + 1u < met.grating.orders ? max(left - own, 0.0) : vec3(0.0);
 }
 
 // Share of a path's power, by which roulette judges, where it keeps these shares of its band and of its companions.
@@ -50,39 +33,35 @@ float share_of_power(Path path, vec3 share, vec3 companions) {
 }
 
 // A grating's orders leave one after the other. The first one that carries light goes on as `child`; for the others the
-// path meets the surface again
-// (`rest`, the path before its flight). `rest` is also the other part of a band that is cut because this order becomes
-// evanescent inside it. Whether `child` lives.
+// path meets the surface again (`rest`, the path before its flight). `rest` is also the other part of a band that is
+// cut because this order becomes evanescent inside it. Whether `child` lives.
 bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout Path rest, out bool rest_lives,
     inout Outcome outcome) {
     GratingEvent met = grating_event(path, event.frame.normal, hit, row);
     uint orders = met.grating.orders, first = min(path.order, orders - 1u), number = first;
     child = child_of(path, hit, dot(path.direction, hit.normal_g) >= 0.0);
     GratingOrder order;
-    vec3 steps;
     bvec3 passes = bvec3(false);
     float at = -1.0;
     rest_lives = false;
     for (; number < orders; ++number) {
         order = order_drawn(met, number, path.walk.photon_id / p.lattices, path.depth,
             hash_combine(p.surface_key, path.walk.photon_id % p.lattices));
-        steps = order_steps(order, hit.object, met.medium, path.band);
-        passes = order_passes(path, event, met, steps);
+        passes = order_passes(met, order, path);
         if (BAND_CUTS) {
             bool is_final = path.recut != 0u && number == first;
             if (any(passes) && !all(passes) && !is_final && path.band.z - path.band.x > MIN_CUT_BAND)
-                at = clear_cut(path, rest, evanescence_in_band(path, event, met, order, passes), hit.distance);
+                at = clear_cut(path, rest, evanescence_in_band(met, order, path, passes), hit.distance);
         }
         if (passes.y || at >= 0.0) break;
     }
-    bool found = number < orders, more = found && number + 1u < orders, cut = at >= 0.0;
-    OrderShares shares = OrderShares(vec3(0.0), vec3(0.0)), companions = shares;
-    if (found) shares = companions = shares_from(met, first, number, path, path.band, false);
-    if (found && HERO && GRATING_PROFILES)
-        companions = shares_from(met, first, number, path, path.walk.companion_x.xyz, true);
-    vec3 left = cut ? shares.kept : more ? max(shares.kept - shares.own, 0.0) : vec3(0.0);
-    vec3 left_companions = cut ? companions.kept : more ? max(companions.kept - companions.own, 0.0) : vec3(0.0);
-    float kept = share_of_power(path, left, left_companions), share = share_of_power(path, shares.own, companions.own);
+    bool found = number < orders, cut = at >= 0.0;
+    vec3 own = vec3(0.0), left = own;
+    if (found) shares_from(met, first, number, path, path.band, false, cut, own, left);
+    vec3 companions = own, left_companions = left;
+    if (HERO && GRATING_PROFILES && found)
+        shares_from(met, first, number, path, path.walk.companion_x.xyz, true, cut, companions, left_companions);
+    float kept = share_of_power(path, left, left_companions), share = share_of_power(path, own, companions);
     outcome.what |= ABSORBED;
     outcome.flux_w = carried_w(path) * max(1.0 - kept - (cut ? 0.0 : share), 0.0);
     outcome.absorbed_w *= 1.0 - kept;
@@ -101,13 +80,12 @@ bool diffract(Path path, Hit hit, Event event, uint row, out Path child, inout P
     if (share <= 0.0) return false;
     bool geometric;
     if (!is_reflective(met.grating)) child.origin.inside ^= 1u;
-    diffract_path(child, event, met, order, steps, geometric);
-    if (HERO && POLARISED) {
+    diffract_path(child, event, met, order, geometric);
+    if (HERO && POLARISED)
         keep_companions(
             child, behind_grating(companions_of(path), path.direction, child.direction, is_reflective(met.grating)));
-    }
-    weaken(child, shares.own, companions.own);
-    if (steps.y != 0.0) leave_companions(child);
+    weaken(child, own, companions);
+    if (order.shift_per_um != 0.0) leave_companions(child);
     // Neighbours on the lattice have gone elsewhere.
     if (LINE_WIDTHS && met.grating.spread_per_um > 0.0) child.walk.flags |= FLAG_OFF_LATTICE;
     outcome.what |= geometric ? FELL_NORMAL : 0u;

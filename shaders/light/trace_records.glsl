@@ -90,10 +90,9 @@ Path load_path(uint slot) {
     }
     if (HAS_GRATING || HAS_CRYSTAL) path.order = ray.flags >> ORDER_BIT;
     if (HAS_CRYSTAL) path.extraordinary = uint((ray.flags & FLAG_EXTRAORDINARY) != 0u);
-    if (POLARISED) {
+    if (POLARISED)
         path.polarisation =
             Polarisation(vec3(ray.axis_x, ray.axis_y, ray.axis_z), ray.stokes_q, ray.stokes_u, ray.stokes_v);
-    }
     return path;
 }
 

@@ -24,7 +24,7 @@ void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companion
         outcome.absorbed_w -= carried_w(child);
         return;
     }
-    if (FILM_MET(event)) outcome.absorbed_w -= carried_w(child);
+    if (HAS_FILM && FILM_MET(event)) outcome.absorbed_w -= carried_w(child);
     outcome.what |= geometric ? FELL_NORMAL : 0u;
 }
 
@@ -39,7 +39,6 @@ void filter_by(uint row, inout Path child, inout float share, inout Outcome outc
     share *= common_share(child, kept.y, companions);
 }
 
-#ifdef RAY_POOL
 // Both parts of the band of the ray in `slot`, from where it set out.
 void send_parts(uint slot, float at, inout Outcome outcome) {
     uint place = first_place(slot, true, false);
@@ -51,15 +50,10 @@ void send_parts(uint slot, float at, inout Outcome outcome) {
         store_path(i == 0u ? place : second_place(slot), ray);
     }
 }
-#endif
 
 #include "light/trace_grating.glsl"
-#if HAS_CRYSTAL
 #include "light/trace_crystal.glsl"
-#endif
-#if HAS_POLARISER
 #include "path/polariser.glsl"
-#endif
 
 // Each child is stored in one place, whichever event made it: where every branch is executed, every
 // store costs even when no path takes it. `border`: where the band is cut before it lands; negative: nowhere.
@@ -86,8 +80,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         outcome.flux_w = carried_w(path) - carried_w(child);
         lives = survives(child, outcome.roulette_w, share, 3u);
     }
-#if HAS_POLARISER
-    if (kind == KIND_POLARISER) {
+    if (HAS_POLARISER && kind == KIND_POLARISER) {
         child = child_of(path, hit, entering);
         vec3 share = pass_polariser(child, crystal_at(thing.receiver));
         weaken(child, share, share);
@@ -96,29 +89,22 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         outcome.flux_w = carried_w(path) - carried_w(child);
         lives = survives(child, outcome.roulette_w, share.y, 2u);
     }
-#endif
-#if HAS_GRATING || HAS_CRYSTAL
-    Path rest = START(start, slot);
+    Path rest;
     bool rest_lives = false;
-#endif
-#if HAS_GRATING
-    if (kind == KIND_GRATING) lives = diffract(path, hit, event, thing.weight_row, child, rest, rest_lives, outcome);
-#endif
-#if HAS_CRYSTAL
-    if (parts_waves) lives = part_in_crystal(path, hit, event, thing.texture, child, rest, rest_lives, outcome);
-#endif
-#ifdef HAS_DIELECTRIC
-    bool splits = IS_GLASS(kind) && event.boundary.changes && !parts_waves;
+    if (HAS_GRATING || HAS_CRYSTAL) rest = START(start, slot);
+    if (HAS_GRATING && kind == KIND_GRATING)
+        lives = diffract(path, hit, event, thing.weight_row, child, rest, rest_lives, outcome);
+    if (HAS_CRYSTAL && parts_waves)
+        lives = part_in_crystal(path, hit, event, thing.texture, child, rest, rest_lives, outcome);
+    bool splits = HAS_DIELECTRIC && IS_GLASS(kind) && event.boundary.changes && !parts_waves;
     vec3 let_through = transmittance_of(event);
     float reflected_share = common_share(path, share_of_lobe(event, event.reflectance), companions.reflectance);
     // Refracted they stay together only where nothing disperses.
     float refracted_share = share_of_lobe(event, let_through);
     if (companions.stay) refracted_share = common_share(path, refracted_share, companions.transmittance);
-    float at = -1.0, below = 0.0;
-#ifdef BAND_CUTS
-    float onset = -1.0;
-    at = splits ? cut_of_band(path, start, slot, event, hit.distance, onset) : border;
-    if (at >= 0.0) {
+    float at = -1.0, below = 0.0, onset = -1.0;
+    if (BAND_CUTS && HAS_DIELECTRIC) at = splits ? cut_of_band(path, start, slot, event, hit.distance, onset) : border;
+    if (BAND_CUTS && HAS_DIELECTRIC && at >= 0.0) {
         // Back to the start of the flight.
         splits = false;
         outcome.absorbed_w = 0.0;
@@ -132,32 +118,27 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         lives = true;
     }
     // A part that was cut here ends at the onset: which side of it that end falls on is rounding.
-    bool parts = splits && event.cosine2.y <= 0.0 && onset >= 0.0 && !leaves_sliver(path, onset);
+    bool parts = BAND_CUTS && splits && event.cosine2.y <= 0.0 && onset >= 0.0 && !leaves_sliver(path, onset);
     PassingPart part;
-    if (parts) part = passing_part(path, event, onset);
-#endif
-    if (splits) {
+    if (BAND_CUTS && HAS_DIELECTRIC && parts) part = passing_part(path, event, onset);
+    if (HAS_DIELECTRIC && splits) {
         // What neither of both parts has in the end, the surface keeps.
-        if ((ROUGH_SURFACES && event.ground.width > 0.0) || FILM_MET(event)) outcome.absorbed_w += carried_w(path);
+        if ((ROUGH_SURFACES && event.ground.width > 0.0) || (HAS_FILM && FILM_MET(event)))
+            outcome.absorbed_w += carried_w(path);
         float share = reflected_share;
         send_on(child, event, event.reflectance, companions.reflectance, unhidden, geometric, share, outcome);
         polarise_companions(child, companions, false);
         lives = reflected_share > 0.0 && survives(child, outcome.roulette_w, share, 1u);
     }
-    if (IS_GLASS(kind) && !event.boundary.changes) {
+    if (HAS_DIELECTRIC && IS_GLASS(kind) && !event.boundary.changes) {
         // Another solid decides here: walk through, only remember where we are.
         child = path;
         child.medium = event.boundary.behind;
         leave_surface(child, hit, entering);
         lives = true;
     }
-#endif
-    bool both = false, stays = false;
-#ifdef HAS_DIELECTRIC
-    both = at >= 0.0 || splits && event.refracted.exists;
-    stays = splits && reflected_share > refracted_share;
-#endif
-    if (HAS_GRATING || HAS_CRYSTAL) both = both || rest_lives;
+    bool refracts = HAS_DIELECTRIC && splits && event.refracted.exists, both = at >= 0.0 || refracts || rest_lives,
+         stays = splits && reflected_share > refracted_share;
     if (lives) {
         uint place = first_place(slot, both, stays);
         if (RAY_POOL && place == NONE) {
@@ -170,13 +151,9 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
 
 #if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
     child = child_of(path, hit, entering);
-    lives = false;
-    if ((HAS_GRATING || HAS_CRYSTAL) && rest_lives) {
-        child = rest;
-        lives = true;
-    }
-#ifdef HAS_DIELECTRIC
-    if (BAND_CUTS) {
+    lives = rest_lives;
+    if ((HAS_GRATING || HAS_CRYSTAL) && rest_lives) child = rest;
+    if (BAND_CUTS && HAS_DIELECTRIC) {
         if (!RAY_POOL && at >= 0.0) {
             child = part_of_band(start, at, start.band.z, 1.0 - below, 6u);
             lives = true;
@@ -193,7 +170,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
             band_w = band_powers(power_row(path), part.band);
         }
     }
-    if (splits && event.refracted.exists) {
+    if (HAS_DIELECTRIC && refracts) {
         unhidden = refract_path(child, event);
         send_on(child, event, let_through, companions.transmittance, unhidden, event.refracted.geometric,
             refracted_share, outcome);
@@ -202,14 +179,11 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         if (SURFACE_FILTERS) filter_by(thing.texture, child, refracted_share, outcome);
         lives = survives(child, outcome.roulette_w, refracted_share, 2u);
     }
-#endif
-#ifdef RAY_POOL
-    if (!lives && second_slot != slot) {
+    if (RAY_POOL && !lives && second_slot != slot) {
         // It was given room already, where nobody is to be found then.
         child.depth = NONE;
         lives = true;
     }
-#endif
     if (lives) {
         store_path(second_place(slot), child);
         outcome.what |= LEFT_SECOND;

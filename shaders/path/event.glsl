@@ -5,9 +5,7 @@
 
 #include "path/path.glsl"
 #include "path/microfacet.glsl"
-#if HAS_FILM
 #include "lib/film.glsl"
-#endif
 
 struct Event {
     ShadingFrame frame;
@@ -20,10 +18,8 @@ struct Event {
     Deflection refracted;
     vec3 theta;  // cosines of incidence there, below 0
     vec3 reflectance;
-#if HAS_FILM
     Film film;
     vec3 transmittance;  // of a film
-#endif
     vec3 s[3];  // of the planes of incidence there
     Polarisation seen;  // the path's state, counted from these
     FresnelPair reflection;
@@ -47,15 +43,20 @@ vec3 incidence_over_band(Path path, Event event) {
             theta.x = dot(path.end_direction[0], event.end_normal[0]);
             theta.z = dot(path.end_direction[1], event.end_normal[1]);
         } else {
-            for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-                float dtheta = incidence_column(path, event, g);
-                theta.x += dtheta * variable_step(uint(g), path.band.x, path.band.y);
-                theta.z += dtheta * variable_step(uint(g), path.band.z, path.band.y);
-            }
+            for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+                theta.xz += incidence_column(path, event, g) * steps_to_ends(path, g);
         }
         theta.xz = clamp(theta.xz, -1.0, -1e-6);
     }
     return theta;
+}
+
+// The normal, of any length, where light of an end of the band arrives (0: lowest, 1: highest wavelength).
+vec3 normal_at_end(Path path, Event event, int end) {
+    if (SPECTRAL_SWEEP) return event.end_normal[end];
+    vec3 normal = event.frame.normal;
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) normal += steps_to_ends(path, g)[end] * NORMAL_COLUMN(event, SPATIAL + g);
+    return normal;
 }
 
 // s of the planes of incidence over the band.
@@ -63,17 +64,8 @@ void planes_of_incidence(Path path, Event event, out vec3 s[3]) {
     s[1] = incidence_axis(path.direction, event.frame.normal, path.polarisation.axis);
     s[0] = s[2] = s[1];
     if (SPECTRAL_GROUPS > 0 && path.restricted != 0u) {
-        vec3 normals[2] = vec3[](event.frame.normal, event.frame.normal);
-        if (SPECTRAL_SWEEP) {
-            normals = event.end_normal;
-        } else {
-            for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
-                normals[0] += variable_step(uint(g), path.band.x, path.band.y) * NORMAL_COLUMN(event, SPATIAL + g);
-                normals[1] += variable_step(uint(g), path.band.z, path.band.y) * NORMAL_COLUMN(event, SPATIAL + g);
-            }
-        }
-        s[0] = incidence_axis(direction_at_end(path, 0), normals[0], s[1]);
-        s[2] = incidence_axis(direction_at_end(path, 1), normals[1], s[1]);
+        s[0] = incidence_axis(direction_at_end(path, 0), normal_at_end(path, event, 0), s[1]);
+        s[2] = incidence_axis(direction_at_end(path, 1), normal_at_end(path, event, 1), s[1]);
     }
 }
 
@@ -138,7 +130,6 @@ void see_polarised(Path path, inout Event event) {
     event.transmission = event.reflection;
 }
 
-#if HAS_FILM
 #define FILM_MET(event) (event.film.row != 0u)
 
 const uint film_slots[] = FILM_SLOTS;
@@ -156,15 +147,11 @@ Film film_met(Path path, Hit hit, Object thing, MediumInterface boundary) {
     }
     return Film(row, back ? FILM_BACK : FILM_FRONT, vec3(1.0));
 }
-#else
-#define FILM_MET(event) false
-#endif
 
 // What a surface makes of light at three wavelengths `x` that meets it at the cosines event.theta, in the state
 // event.seen: over a band, or `single`, each by itself. `kind`: of the surface.
 void share_at(vec3 x, bool single, uint kind, inout Event event) {
-    bool glass = HAS_DIELECTRIC && IS_GLASS(kind), solid = glass && !IS_THIN(event.boundary);
-    if (HAS_DIELECTRIC && glass) {
+    if (HAS_DIELECTRIC && IS_GLASS(kind)) {
         interface_indices(event.boundary, x, event.n_i, event.n_t);
         vec3 eta_it = event.n_i / event.n_t;
         event.cosine2 = transmitted_cosine2(event.theta, eta_it);
@@ -178,10 +165,10 @@ void share_at(vec3 x, bool single, uint kind, inout Event event) {
             event.reflectance = OF_SHEET(event.boundary, event.reflectance);
         }
     }
-#if HAS_FILM
-    // A film's shares take the place of Fresnel's.
-    event.transmittance = 1.0 - event.reflectance;
-    if (FILM_MET(event)) {
+    if (HAS_FILM) event.transmittance = 1.0 - event.reflectance;
+    if (HAS_FILM && FILM_MET(event)) {
+        // A film's shares take the place of Fresnel's.
+        bool solid = HAS_DIELECTRIC && IS_GLASS(kind) && !IS_THIN(event.boundary);
         event.film.cosine = -event.theta;
         if (solid && event.film.back == FILM_BACK) {
             event.film.cosine = sqrt(max(event.cosine2, 0.0));
@@ -201,21 +188,16 @@ void share_at(vec3 x, bool single, uint kind, inout Event event) {
                 FILM_TABLES == 1 ? 1.0 - event.reflectance : film_share(event.film, FILM_PASSED, x, single);
         }
     }
-#endif
-    if (HAS_DIELECTRIC && glass) {
+    if (HAS_DIELECTRIC && IS_GLASS(kind)) {
         GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
     }
 }
 
 // What a surface of glass lets through.
-#if HAS_FILM
-#define transmittance_of(event) (event.transmittance)
-#else
-#define transmittance_of(event) (1.0 - event.reflectance)
-#endif
+#define transmittance_of(event) (HAS_FILM ? event.transmittance : 1.0 - event.reflectance)
 
 // The share of a lobe by which it is followed or not: its anchor's; in a film's ripples, of all the band.
-float share_of_lobe(Event event, vec3 share) { return FILM_MET(event) ? dot(share, vec3(0.25, 0.5, 0.25)) : share.y; }
+float share_of_lobe(Event event, vec3 share) { return HAS_FILM && FILM_MET(event) ? dot(share, OVER_BAND) : share.y; }
 
 // What glass reflects of a path over its band, and where the rest goes.
 void share_out(Path path, uint kind, inout Event event) {
@@ -232,9 +214,7 @@ void share_out(Path path, uint kind, inout Event event) {
     // surface.
     if (polished && !event.refracted.exists && event.cosine2.y > 0.0) {
         event.reflectance = vec3(1.0);
-#if HAS_FILM
-        event.transmittance = vec3(0.0);
-#endif
+        if (HAS_FILM) event.transmittance = vec3(0.0);
     }
 }
 
@@ -261,17 +241,14 @@ bool parts_wavelengths(Event event) { return event.n_i.x * event.n_t.z != event.
 Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {
     Event event = event_at(path, hit, facet);
     if (ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
-    bool glass = HAS_DIELECTRIC && IS_GLASS(thing.kind);
-    if (HAS_DIELECTRIC && glass)
+    if (HAS_DIELECTRIC && IS_GLASS(thing.kind))
         event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
-#if HAS_FILM
-    event.film = film_met(path, hit, thing, event.boundary);
-#endif
-    if (HAS_DIELECTRIC && glass) {
+    if (HAS_FILM) event.film = film_met(path, hit, thing, event.boundary);
+    if (HAS_DIELECTRIC && IS_GLASS(thing.kind)) {
         if (!(HAS_CRYSTAL && meets_crystal(event.boundary))) share_out(path, thing.kind, event);
     } else {
         if (POLARISED) see_polarised(path, event);
-        if (FILM_MET(event)) {
+        if (HAS_FILM && FILM_MET(event)) {
             event.theta = incidence_over_band(path, event);
             share_at(path.band, false, thing.kind, event);
         }
@@ -295,9 +272,7 @@ vec3 leaving_share(Event event, Path path, bool geometric, float side) {
         vec2 turn = vec2(0.0);
         for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
             float along = dot(path.ddirection[SPATIAL + g], ground.normal);
-            turn += along
-                * vec2(
-                    variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
+            turn += along * steps_to_ends(path, g);
         }
         vec2 change = leaves ? side * smith_slope(cosine.y, ground.width) * turn : vec2(0.0);
         float steepness = max(abs(change.x), abs(change.y)) / MOST_CHANGE;
@@ -320,14 +295,9 @@ vec3 reflect_path(inout Path path, Event event, out bool geometric) {
             path.end_direction[end] = normalize(reflect_direction(direction, normal, dot(direction, normal)));
         }
     }
-    if (POLARISED) {
+    if (POLARISED)
         path.polarisation = out_of_plane(behind_interface(event.seen, event.reflection), path.direction, event.s);
-    }
-    if (ROUGH_SURFACES) {
-        return leaving_share(event, path, geometric, 1.0);
-    } else {
-        return vec3(1.0);
-    }
+    return ROUGH_SURFACES ? leaving_share(event, path, geometric, 1.0) : vec3(1.0);
 }
 
 // The path refracted, in the medium behind; see `reflect_path`.
@@ -356,14 +326,9 @@ vec3 refract_path(inout Path path, Event event) {
                 : direction_l;
         }
     }
-    if (POLARISED) {
+    if (POLARISED)
         path.polarisation = out_of_plane(behind_interface(event.seen, event.transmission), path.direction, event.s);
-    }
-    if (ROUGH_SURFACES) {
-        return leaving_share(event, path, turned.geometric, -1.0);
-    } else {
-        return vec3(1.0);
-    }
+    return ROUGH_SURFACES ? leaving_share(event, path, turned.geometric, -1.0) : vec3(1.0);
 }
 
 // The wavelength within the band where total internal reflection sets in, for an event that reflects some of it totally

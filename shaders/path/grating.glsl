@@ -4,17 +4,6 @@
 #include "lib/grating.glsl"
 #include "path/event.glsl"
 
-// What a path meets at a grating, for all its orders.
-struct GratingEvent {
-    Grating grating;
-    uint row;
-    uint object;
-    uint medium;  // that the path is in
-    float side;  // 1 where the frame's normal is the outward one, else -1
-    vec3 across;  // unit, in the surface across the lines
-    vec3 normal;
-};
-
 GratingEvent grating_event(Path path, vec3 normal, Hit hit, uint row) {
     GratingEvent met;
     met.grating = grating_at(row);
@@ -22,8 +11,8 @@ GratingEvent grating_event(Path path, vec3 normal, Hit hit, uint row) {
     met.object = hit.object;
     met.medium = current_medium(path.medium);
     met.side = dot(path.direction, hit.normal_g) < 0.0 ? 1.0 : -1.0;
-    met.across = across_lines(normal, met.grating.lines, met.side);
     met.normal = normal;
+    met.across = across_lines(met, normal);
     return met;
 }
 
@@ -37,68 +26,82 @@ GratingOrder order_drawn(GratingEvent met, uint order_number, uint number, uint 
     return order;
 }
 
-// A direction across the lines, along them and along the outward normal.
-vec3 in_lines(GratingEvent met, vec3 direction) {
-    vec3 outward = met.side * met.normal;
-    return vec3(dot(direction, met.across), dot(direction, cross(outward, met.across)), dot(direction, outward));
-}
-
-// Share of light that comes in the direction `light`, as of `in_lines`, in an order at x.
-float order_share(GratingEvent met, GratingOrder order, uint number, vec3 light, float x) {
+// Share of light at x in an order of a path along `direction`; on a path from the camera it comes back along the order.
+float order_share(GratingEvent met, GratingOrder order, uint number, vec3 direction, float x) {
+    vec3 outward = met.side * met.normal,
+         light = vec3(dot(direction, met.across), dot(direction, cross(outward, met.across)), dot(direction, outward));
+    if (CAMERA_SPECULAR) {
+        light.x += order_step(met, order, x);
+        float cosine = met.side * sqrt(max(1.0 - dot(light.xy, light.xy), 0.0));
+        light = vec3(-light.xy, is_reflective(met.grating) ? -cosine : cosine);
+    }
     float waves = groove_waves(met.grating, light, medium_index(met.medium, x), medium_index(met.object, x));
     return order.efficiency * profile_share(met.grating, order, number, waves);
 }
 
-// Where over its band a path is not evanescent in an order of these steps.
-bvec3 order_passes(Path path, Event event, GratingEvent met, vec3 steps) {
-    vec3 normal = event.frame.normal;
-    bvec3 passes = bvec3(diffracted_cosine2(path.direction, dot(path.direction, normal), steps.y * met.across) > 0.0);
+// Shares of a path's light in an order, over x. `single`: of three wavelengths that are with the anchor.
+vec3 order_shares(GratingEvent met, GratingOrder order, uint number, Path path, vec3 x, bool single) {
+    vec3 shares = vec3(order.efficiency), low = path.direction, high = path.direction;
+    if (GRATING_PROFILES && met.grating.profile != 0u) {
+        if (SPECTRAL_GROUPS > 0 && !single) {
+            low = direction_at_end(path, 0);
+            high = direction_at_end(path, 1);
+        }
+        shares = vec3(order_share(met, order, number, low, x.x), order_share(met, order, number, path.direction, x.y),
+            order_share(met, order, number, high, x.z));
+    }
+    return shares;
+}
+
+bool order_passes(GratingEvent met, GratingOrder order, vec3 direction, float x) {
+    return diffracted_cosine2(direction, dot(direction, met.normal), order_step(met, order, x) * met.across) > 0.0;
+}
+
+// Where over its band a path is not evanescent in an order.
+bvec3 order_passes(GratingEvent met, GratingOrder order, Path path) {
+    bvec3 passes = bvec3(order_passes(met, order, path.direction, path.band.y));
     if (SPECTRAL_GROUPS > 0) {
-        vec3 low = direction_at_end(path, 0), high = direction_at_end(path, 1);
-        passes.x = diffracted_cosine2(low, dot(low, normal), steps.x * met.across) > 0.0;
-        passes.z = diffracted_cosine2(high, dot(high, normal), steps.z * met.across) > 0.0;
+        passes.x = order_passes(met, order, direction_at_end(path, 0), path.band.x);
+        passes.z = order_passes(met, order, direction_at_end(path, 1), path.band.z);
     }
     return passes;
 }
 
-// The wavelength within the band where an order becomes evanescent, of one that `passes` somewhere and somewhere not.
-float evanescence_in_band(Path path, Event event, GratingEvent met, GratingOrder order, bvec3 passes) {
-    vec3 columns[SPECTRAL_GROUPS], bends[2] = vec3[](vec3(0.0), vec3(0.0));
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g) columns[g] = path.ddirection[SPATIAL + g];
-    if (SPECTRAL_SWEEP) {
-        for (int end = 0; end < 2; ++end) {
-            vec3 position, direction;
-            linear_end(path, end, position, direction);
-            bends[end] = path.end_direction[end] - direction;
-        }
+// The wavelength within the band where an order becomes evanescent, in the half whose ends `passes` tells apart.
+float evanescence_in_band(GratingEvent met, GratingOrder order, Path path, bvec3 passes) {
+    bool low_side = passes.x != passes.y, passes_a = low_side ? passes.x : passes.y;
+    float a = low_side ? path.band.x : path.band.y, b = low_side ? path.band.y : path.band.z;
+    for (int i = 0; i < ONSET_HALVINGS; ++i) {
+        float x = 0.5 * (a + b);
+        vec3 position, direction;
+        ray_at(path, x, position, direction);
+        bool passes_x = order_passes(met, order, direction, x);
+        a = passes_x == passes_a ? x : a;
+        b = passes_x == passes_a ? b : x;
     }
-    return evanescence_onset(path.band, path.direction, columns, bends, event.frame.normal, met.grating.lines, met.side,
-        order, met.object, met.medium, passes);
+    return 0.5 * (a + b);
 }
 
 // The path turned into an order. `geometric`: the facet's normal had to judge.
-void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder order, vec3 steps, out bool geometric) {
-    bool reflects = is_reflective(met.grating);
-    Deflection turned = diffract_at(event.frame, path.direction, met.grating.lines, met.side, steps.y, reflects);
+void diffract_path(inout Path path, Event event, GratingEvent met, GratingOrder order, out bool geometric) {
+    float step = order_step(met, order, path.band.y), theta, cosine2, omega;
+    Deflection turned = diffract_at(met, event.frame, path.direction, step);
     geometric = turned.geometric;
     if (SPECTRAL_SWEEP) {
-        for (int end = 0; end < 2; ++end) {
-            vec3 normal = turned.geometric ? turned.normal : event.end_normal[end], direction = path.end_direction[end];
-            vec3 shift = (end == 0 ? steps.x : steps.z) * across_lines(normal, met.grating.lines, met.side);
-            float theta = dot(direction, normal), cosine2 = diffracted_cosine2(direction, theta, shift);
-            path.end_direction[end] =
-                normalize(diffract_direction(direction, normal, theta, shift, sqrt(max(cosine2, 1e-12)), reflects));
-        }
+        for (int end = 0; end < 2; ++end)
+            path.end_direction[end] = normalize(diffract_direction(met, path.end_direction[end],
+                turned.geometric ? turned.normal : event.end_normal[end],
+                order_step(met, order, end == 0 ? path.band.x : path.band.z), theta, cosine2, omega));
     }
     for (int c = 0; c < PATH_COLUMNS; ++c) {
         float dstep = 0.0;
         if (SPECTRAL_GROUPS > 0 && c >= SPATIAL && c < SPATIAL + SPECTRAL_GROUPS)
-            dstep = order_step_derivative(order, met.object, met.medium, uint(c - SPATIAL), path.band.y);
-        path.ddirection[c] = diffracted_column(turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c),
-            met.grating.lines, met.side, steps.y, dstep, reflects);
+            dstep = order_step_derivative(met, order, uint(c - SPATIAL), path.band.y);
+        path.ddirection[c] =
+            diffracted_column(met, turned, path.direction, path.ddirection[c], NORMAL_COLUMN(event, c), step, dstep);
     }
-    if (POLARISED) {
-        path.polarisation = behind_grating(path.polarisation, path.direction, turned.direction, reflects);
-    }
+    if (POLARISED)
+        path.polarisation =
+            behind_grating(path.polarisation, path.direction, turned.direction, is_reflective(met.grating));
     path.direction = turned.direction;
 }

@@ -63,11 +63,14 @@ void gather_ends(inout Path path) {
     }
 }
 
+// Change of group g's variable from the anchor to either end of the band.
+vec2 steps_to_ends(Path path, int g) {
+    return vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
+}
+
 // Sets `end_step` from the band.
 void set_steps(inout Path path) {
-    for (int g = 0; g < SPECTRAL_GROUPS; ++g)
-        path.end_step[g] =
-            vec2(variable_step(uint(g), path.band.x, path.band.y), variable_step(uint(g), path.band.z, path.band.y));
+    for (int g = 0; g < SPECTRAL_GROUPS; ++g) path.end_step[g] = steps_to_ends(path, g);
 }
 
 // A path at its start, at the wavelength x and with zero columns; the caller initialises `walk`.
@@ -119,18 +122,14 @@ void ray_at(Path path, float x, out vec3 position, out vec3 direction) {
 
 // The direction at an end of the band (0: lowest, 1: highest wavelength).
 vec3 direction_at_end(Path path, int end) {
-    if (SPECTRAL_SWEEP) {
-        return path.end_direction[end];
-    } else {
-        vec3 direction = path.direction;
-        if (SPECTRAL_GROUPS > 0) {
-            for (int g = 0; g < SPECTRAL_GROUPS; ++g)
-                direction += variable_step(uint(g), end == 0 ? path.band.x : path.band.z, path.band.y)
-                    * path.ddirection[SPATIAL + g];
-            direction = normalize(direction);
-        }
-        return direction;
+    if (SPECTRAL_SWEEP) return path.end_direction[end];
+    vec3 direction = path.direction;
+    if (SPECTRAL_GROUPS > 0) {
+        for (int g = 0; g < SPECTRAL_GROUPS; ++g)
+            direction += steps_to_ends(path, g)[end] * path.ddirection[SPATIAL + g];
+        direction = normalize(direction);
     }
+    return direction;
 }
 
 // Restricts a path to `band`, a part of its band, and moves its ray to the new anchor.

@@ -71,14 +71,14 @@ OF_LIBRARY = {
     ),
     "a grating in glass without its slope": Mutant(
         "lib/grating.glsl",
-        "derivative -= medium_index",
-        "derivative -= 0.0 * medium_index",
+        "- medium_index(met.object, x) / (n * n)",
+        "- 0.0 * medium_index(met.object, x) / (n * n)",
         "gpu/test_grating_gpu.py::test_inside_dispersive_glass_against_the_slow_tracer",
     ),
     "orders along the lines": Mutant(
         "lib/grating.glsl",
-        "return side * normalize(cross(lines, normal))",
-        "return side * normalize(lines)",
+        "return met.side * normalize(cross(met.grating.lines, normal))",
+        "return met.side * normalize(met.grating.lines)",
         "gpu/test_grating_gpu.py::test_lines_of_mercury",
     ),
     "facets that light meets before the sheet": Mutant(
@@ -94,9 +94,9 @@ OF_LIBRARY = {
         "gpu/test_line_widths_gpu.py::test_a_slits_minima_and_maxima[srd]",
     ),
     "a camera's own ray taken for the light at a grating": Mutant(
-        "camera/grating.glsl",
-        "return vec3(-sent.xy, is_reflective",
-        "return vec3(sent.xy, is_reflective",
+        "path/grating.glsl",
+        "light = vec3(-light.xy, is_reflective",
+        "light = vec3(light.xy, is_reflective",
         "gpu/test_grating_profiles_gpu.py::test_the_camera_sees_the_shares_of_light_that_comes_back[blazed]",
     ),
     "polarisation without its power": Mutant(

@@ -165,10 +165,13 @@ FUNCTIONS = """
     ShadingFrame frame;
     frame.normal = frame.normal_g = dot(d, n) < 0.0 ? n : -n;
     frame.interpolated = frame.refused = 0u;
-    float side = dot(d, n) < 0.0 ? 1.0 : -1.0;
-    Deflection turned = diffract_at(frame, d, l, side, step_, REFLECTS);
+    GratingEvent met;
+    met.grating.lines = l;
+    met.grating.index = REFLECTS ? 0.0 : 1.0;
+    met.side = dot(d, n) < 0.0 ? 1.0 : -1.0;
+    Deflection turned = diffract_at(met, frame, d, step_);
     out_d = turned.direction;
-    out_dd = diffracted_column(turned, d, dd, side * dn, l, side, step_, dstep, REFLECTS);
+    out_dd = diffracted_column(met, turned, d, dd, met.side * dn, step_, dstep);
     exists = turned.exists ? 1.0 : 0.0;
 """
 _SCENE = {

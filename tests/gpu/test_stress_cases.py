@@ -97,8 +97,8 @@ MUTANTS = {
     "wrong sign of dispersion when leaving": (
         "gem-bands",
         "lib/medium.glsl",
-        "derivative += medium_slope(boundary.before, x)",
-        "derivative -= medium_slope(boundary.before, x)",
+        "return index_slope(boundary.before",
+        "return -index_slope(boundary.before",
         "band ends",
     ),
     "overflow not seen": ("overflow", "light/footprint.comp", "    if (held < 1.0) {", "    if (held < -1.0) {", ""),
