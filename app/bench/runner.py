@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..gpu.context import Context
+from ..model.panorama_lights import with_panorama_lights
 from ..model.scene import Scene
 from ..reference import metrics
 from ..reference.metrics import ReferencePicture
@@ -79,14 +80,8 @@ class _SceneBench:
         subject: Subject,
         start_seconds: float,
     ) -> None:
-        self._start_seconds = start_seconds
-        self._context, self._scene, self._store, self._progress, self._subject = (
-            context,
-            scene,
-            store,
-            progress,
-            subject,
-        )
+        self._context, self._store, self._progress, self._subject = context, store, progress, subject
+        self._scene, self._start_seconds = with_panorama_lights(scene), start_seconds
         self._settings = store.result.settings
         self._size = picture_size(scene, self._settings)
         key = subject.key(scene, *self._size)
