@@ -6,6 +6,7 @@ be printed could not be (a closed pipe, a full disk), or a bug with its tracebac
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
 import os
@@ -78,6 +79,7 @@ class _Patient:
 
 def _run(arguments: Sequence[str] | None) -> int:
     waste_little()
+    atexit.register(gc.freeze)  # else what is there at the end is looked through three times, for an eighth of a second
     gc.set_threshold(50_000)  # what is imported stays: looking through it again and again is a tenth of the start
     from .commands.program import run
 

@@ -149,6 +149,10 @@ class Struct:
 
     def glsl(self) -> str:
         """GLSL declaration of the struct."""
+        return self._declaration
+
+    @cached_property
+    def _declaration(self) -> str:
         lines = [f"struct {self.name} {{"]
         for field in self.fields:
             suffix = f"[{field.count}]" if field.count > 1 else ""

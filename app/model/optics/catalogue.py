@@ -8,6 +8,7 @@ it, as in "hikari:F2", to choose. Nothing is read before the first lookup.
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import cast
@@ -51,9 +52,12 @@ class Entry:
         return Dispersion(self.qualified_name, cast(Kind, kind), self.coefficients, self.range_nm)
 
 
+_NO_KEY = re.compile(r"[^\w+*]|_")
+
+
 def search_key(text: str) -> str:
     """`text` without case, blanks and punctuation; "+" and "*" are part of some names."""
-    return "".join(c for c in text.casefold() if c.isalnum() or c in "+*")
+    return _NO_KEY.sub("", text.casefold())
 
 
 @cache
