@@ -6,14 +6,19 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from ..base.errors import UserError
 from ..model.materials.absorption import MAX_ATTENUATION
 from ..model.materials.dielectric import MAX_PRIORITY
+from ..model.optics import glass
 from ..model.optics.glass import Dispersion
 from ..model.optics.tints import Tint
 from ..model.scene import Absorption, Dielectric, Scene, Vec3
 from ..model.scene_checks import check_lines
 from .objects import changed
+
+_CURVE_NM = np.arange(380.0, 781.0, 4.0)
 
 
 def set_dispersion(scene: Scene, index: int, dispersion: Dispersion) -> Scene:
@@ -31,6 +36,20 @@ def set_dispersion(scene: Scene, index: int, dispersion: Dispersion) -> Scene:
 def set_dispersion_gain(scene: Scene, index: int, gain: float) -> Scene:
     """Factor on n(λ) − n_d of object `index`: 0 none, 1 as in nature."""
     return changed(scene, index, material=_glass(scene, index).with_gain(gain, scene.objects[index].name))
+
+
+def bent(dispersion: Dispersion, field: str, change: float) -> Dispersion:
+    """The glass with its "n_d", its "V_d" or its whole "index" changed, by the differences of glasses that have no more
+    than n_d and V_d; the rest of its curve stays."""
+    n_d, v_d = dispersion.n_d, dispersion.natural.V_d
+    n = dispersion.index(_CURVE_NM)
+    if field == "index" or not math.isfinite(v_d):
+        n = n + change
+    else:
+        other = (n_d + change, v_d) if field == "n_d" else (n_d, v_d + change)
+        shift = glass.from_abbe(*other).index(_CURVE_NM) - glass.from_abbe(n_d, v_d).index(_CURVE_NM)
+        n = n + dispersion.gain * shift + (1.0 - dispersion.gain) * (other[0] - n_d)
+    return glass.table(_CURVE_NM, n, dispersion.name)
 
 
 def abbe_numbers(dispersion: Dispersion) -> tuple[float, float]:

@@ -196,6 +196,15 @@ class Animate(Request):
 
 
 @dataclass(frozen=True)
+class MatchGlass(Request):
+    """Find the catalogue's glasses whose light is nearest to what object `index` casts now."""
+
+    index: int
+    photons: int = 100_000
+    """Of each glass that is tried."""
+
+
+@dataclass(frozen=True)
 class CancelJob(Request):
     """Stop the running export; what is finished stays."""
 
@@ -227,5 +236,5 @@ class DismissMessage(Request):
     text: str
 
 
-LongExport = RenderPicture | Bake | Animate
+LongExport = RenderPicture | Bake | Animate | MatchGlass
 Export = Screenshot | LongExport

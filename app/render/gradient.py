@@ -14,17 +14,15 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..base.generators import mapped
+from ..edit.glass import bent
 from ..edit.parameters import Stage, apply, parameter, parts, value_of
 from ..gpu.context import Context
-from ..model.optics import glass
-from ..model.optics.glass import Dispersion
 from ..model.settings import RenderSettings
 from .bake import placement
 from .frames import FrameRenderer, Picture
 
 INDEX = "index"
 """Parameter of an object of glass: n(λ), raised alike at all wavelengths."""
-_CURVE_NM = np.arange(380.0, 781.0, 4.0)
 _CHANGE, _LEAST_CHANGE, _MOST_CHANGE = 0.03, 0.01, 0.08
 """Change of the picture, as a share of its norm, that a step is to make: much less is lost in rounding, and more is no
 derivative."""
@@ -150,23 +148,12 @@ def nudged(stage: Stage, path: str, change: float) -> Stage:
     if head != "objects" or not _is_glass(stage, path) or field == "dispersion_gain":
         return apply(stage, path, value_of(stage, path) + change)
     items = tuple(
-        replace(item, material=item.material.changed(dispersion=_bent(item.material.dispersion, path, change)))
+        replace(
+            item,
+            material=item.material.changed(dispersion=bent(item.material.dispersion, path.rpartition(".")[2], change)),
+        )
         if item.name == name
         else item
         for item in stage.scene.objects
     )
     return replace(stage, scene=replace(stage.scene, objects=items))
-
-
-def _bent(dispersion: Dispersion, path: str, change: float) -> Dispersion:
-    """The glass with n_d, V_d or the whole curve changed, by the differences of glasses that have no more than n_d and
-    V_d."""
-    field, n_d, v_d = path.rpartition(".")[2], dispersion.n_d, dispersion.natural.V_d
-    n = dispersion.index(_CURVE_NM)
-    if field == INDEX or not np.isfinite(v_d):
-        n = n + change
-    else:
-        other = (n_d + change, v_d) if field == "n_d" else (n_d, v_d + change)
-        shift = glass.from_abbe(*other).index(_CURVE_NM) - glass.from_abbe(n_d, v_d).index(_CURVE_NM)
-        n = n + dispersion.gain * shift + (1.0 - dispersion.gain) * (other[0] - n_d)
-    return glass.table(_CURVE_NM, n, dispersion.name)

@@ -137,6 +137,15 @@ def glass_called(scene: Scene, name: str) -> int:
     return [item.name for item in scene.objects].index(name)
 
 
+def flat_receiver(scene: Scene) -> str:
+    """The first one. Raises `UserError`."""
+    flat = (o.name for o in scene.objects if o.name in scene.receiver_names and o.mesh.is_flat)
+    found = next(flat, None)
+    if found is None:
+        raise UserError(f"scene '{scene.name}' has no flat receiver, on which light could be compared: add a table")
+    return found
+
+
 def line(scene: Scene, receiver: str, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
     """Corners of a target that is a narrow strip about a line on a receiver."""
     item = scene.objects[[item.name for item in scene.objects].index(receiver)]

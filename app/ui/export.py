@@ -125,6 +125,8 @@ class Exports:
     def _made(self, request: requests.LongExport, state: State, exposure_ev: float) -> ExportJob:
         thread = self._find_thread()
         context = self._context if thread is None else thread.context
+        if isinstance(request, requests.MatchGlass):
+            return _matched(context, request, state, thread)
         size, name, notices = request.size, request.path.name, FrameNotices()
         shown_size = state.viewport_size if isinstance(request, requests.Bake) else size
         stage = Stage(state.scene, state.camera_for(shown_size), exposure_ev, state.solo_nm)
@@ -239,6 +241,29 @@ def _bake(
     check_writable(request.path)
     check_writable(bake.placement_path(request.path))
     return bake.bake(context, stage, settings, request.receiver, request.path, notices)
+
+
+def _matched(context: Context, request: requests.MatchGlass, state: State, thread: ContextThread | None) -> ExportJob:
+    """Which glasses come near the light of the scene on its first flat receiver, as a note."""
+    from ..render.solving import Solver, flat_receiver, wanted
+
+    scene, notices = state.scene, FrameNotices()
+    stage, receiver = Stage(scene, scene.camera), flat_receiver(scene)
+    settings = _settings(state, state.viewport_size, photons=request.photons)
+
+    def work() -> Iterator[float]:
+        target = yield from wanted(context, stage, settings, receiver, None, None)
+        found = yield from Solver(context, stage, settings, target).match(request.index, 3)
+        near = (
+            f"{g.name} (n_d {g.n_d:.4f}, V_d {g.V_d:.1f}) differs by {100.0 * g.error:.2g} %" for g in found.glasses
+        )
+        notices.take(near)
+
+    name = scene.objects[request.index].name
+    words = Words(
+        f"Glass of {name}", f"Glasses that light '{receiver}' most alike:", "No glass was looked for any more."
+    )
+    return ExportJob(words, work(), notices, thread)
 
 
 def _animate(

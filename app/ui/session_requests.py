@@ -283,6 +283,7 @@ _HANDLERS: dict[type, Callable[[Session, Any], Answer | None]] = {
     requests.RenderPicture: _export,
     requests.Bake: _export,
     requests.Animate: _export,
+    requests.MatchGlass: _export,
     requests.CancelJob: lambda session, _: session.jobs.cancel_export(),
     requests.ComputeReference: lambda session, _: session.jobs.comparison.restart(),
     requests.CopyMaterial: _copy_material,

@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 import spectrasplat as ss
 from scipy.ndimage import gaussian_filter
+from spectrasplat.edit.glass import bent
 from spectrasplat.edit.parameters import Stage
 from spectrasplat.model.io.scene_file import load_scene
+from spectrasplat.model.optics.catalogue import find
+from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.frames import FrameRenderer
@@ -113,3 +116,17 @@ def test_from_python(tmp_path: Path) -> None:
         ss.gradient(scene, "camera.position.x", "table")
     with pytest.raises(ss.UserError, match="no receiver"):
         ss.gradient(scene, "objects.ball.n_d", "ball")
+
+
+def test_a_bent_glass_has_the_numbers_it_was_bent_to() -> None:
+    """n_d and V_d change apart, under a gain as well, and the rest of the curve stays."""
+    for gain in (1.0, 2.0):
+        dispersion = with_gain(find("N-SF11"), gain)
+        higher, flatter = bent(dispersion, "n_d", 1e-3), bent(dispersion, "V_d", 0.5)
+        assert higher.n_d - dispersion.n_d == pytest.approx(1e-3, abs=2e-6)
+        assert gain * higher.V_d == pytest.approx(gain * dispersion.V_d, abs=0.02)
+        assert flatter.n_d == pytest.approx(dispersion.n_d, abs=2e-6)
+        assert gain * flatter.V_d == pytest.approx(gain * dispersion.V_d + 0.5, abs=0.02)
+        raised = bent(dispersion, "index", 1e-3)
+        nm = np.array([400.0, 550.0, 700.0])
+        assert raised.index(nm) - dispersion.index(nm) == pytest.approx(1e-3, abs=2e-6)

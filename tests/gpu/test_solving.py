@@ -79,21 +79,22 @@ def test_what_is_no_target_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_hidden_glass_is_found_among_all() -> None:
-    """By the spectra that it casts: first of all, n_d within 1e-4 and V_d within 0.5."""
+    """By the spectra that it casts in texels twice as wide: among the first ten, n_d within 1e-4 and V_d within 0.5."""
     scene = ss.load("spectrum")
     hidden = scene.copy()
     hidden.objects["prism"].update(glass="Ohara S-LAH64")
     target, between = light_of(hidden, "screen", seed=3)
     found = ss.match(scene, "prism", "screen", target, between, photons=60_000)
     glass = ss.glass("Ohara S-LAH64")
-    assert found.glasses[0].error < 0.02 and abs(found.glasses[0].n_d - glass.n_d) < 1e-4
+    assert glass.name in [each.name for each in found.glasses]
+    assert found.glasses[0].error < 0.05 and abs(found.glasses[0].n_d - glass.n_d) < 1e-4
     assert found.fit.values["n_d"] == pytest.approx(glass.n_d, abs=1e-4)
     assert found.fit.values["V_d"] == pytest.approx(glass.V_d, abs=0.5)
 
 
 @pytest.mark.slow
 def test_numbers_are_fitted_through_noise() -> None:
-    """n_d, V_d and the prism's turn at once, each within four of its standard deviations."""
+    """n_d, V_d and the prism's turn at once, each within four standard deviations and what wider texels leave."""
     true = ss.load("spectrum")
     true.objects["prism"].update(glass=None, material={"n_d": 1.70, "V_d": 30.0})
     target, between = light_of(true, "screen", seed=3)
@@ -102,8 +103,9 @@ def test_numbers_are_fitted_through_noise() -> None:
     start.objects["prism"].update(material={"n_d": 1.703, "V_d": 32.0})
     paths = ["objects.prism.n_d", "objects.prism.V_d", "objects.prism.rotation.y"]
     found = ss.fit(start, paths, "screen", noisy, between, photons=60_000)
-    for path, wanted in zip(paths, (1.70, 30.0, 0.0), strict=True):
-        assert abs(found.values[path] - wanted) < 4.0 * found.deviations[path] + 1e-4
+    for path, wanted, blur in zip(paths, (1.70, 30.0, 0.0), (2e-4, 0.05, 0.05), strict=True):
+        assert 0.0 < found.deviations[path] < blur
+        assert abs(found.values[path] - wanted) < 4.0 * found.deviations[path] + blur
 
 
 @pytest.mark.slow

@@ -14,6 +14,7 @@ from ...base.tone_map import LUMINANCE_709
 from ...edit.requests import ComputeReference
 from ...edit.state import Compare, CompareMode, State
 from .. import theme
+from ..compared_with import LOWER_INDEX
 from ..view_model import ViewModel
 from . import file_browser, rows, spectrum_strip, widgets
 from .methods import MENU_METHODS, METHOD_TIPS
@@ -36,7 +37,11 @@ _TIPS = {
     "glass": "The same scene with one solid of another glass, traced in its own engine.",
     "file": "A picture from a file, such as another program's of the same view.",
 }
-_GLASSES = ("N-BK7", "F2", "N-SF11", "N-SF66", "water", "diamond")
+_GLASSES = (LOWER_INDEX, "N-BK7", "F2", "N-SF11", "N-SF66", "water", "diamond")
+_OF_SOLID = (
+    "Of the selected solid, or else of the first. With a slightly lower n_d the error map is the picture's derivative "
+    "by n_d: red becomes brighter, blue darker."
+)
 ERROR_RANGE = 0.5
 """Relative error at the ends of the map's scale (`passes.display.ERROR_RANGE`)."""
 _WIDE_EM = 40.0
@@ -73,7 +78,7 @@ def _controls(state: State, view_model: ViewModel) -> State:
         present = {
             item.material.dispersion.name for item in state.scene.objects if item.material.dispersion is not None
         }
-        others_of = [name for name in _GLASSES if not any(one.endswith(name) for one in present)]
+        others_of = [name for name in _GLASSES[1:] if not any(one.endswith(name) for one in present)]
         compare = replace(compare, glass=others_of[0] if others_of else compare.glass)
     compare = replace(compare, mode=mode, method=method)
     if method == "glass":
@@ -91,7 +96,7 @@ def _controls(state: State, view_model: ViewModel) -> State:
 
 def _glass(compare: Compare) -> Compare:
     glasses = dict.fromkeys((*_GLASSES, compare.glass))
-    glass = widgets.combo("Glass", tuple(glasses), compare.glass, tip="Of the selected solid, or else of the first.")
+    glass = widgets.combo("Glass", tuple(glasses), compare.glass, tip=_OF_SOLID)
     # One that does not exist is reported below, with what was perhaps meant.
     typed = widgets.text_field("Other glass", glass, tip="Any name of the catalogue, such as N-LAK33B.")
     return replace(compare, glass=typed if typed == glass else typed.strip())
