@@ -93,18 +93,17 @@ def _run(
     values = None if target is None else _values(target)
     model = scene._model
 
-    def steps(context: Context) -> Generator[float, None, T]:
+    def run(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> T:
         from ..edit.parameters import Stage
         from ..gpu.shader import keep_programs
-        from ..render.solving import Solver, wanted
+        from ..render.solving import solution
 
         keep_programs(context.ctx)
         stage = Stage(model, model.camera)
-        its = yield from wanted(context, stage, settings, receiver, values, between)
-        return (yield from work(Solver(context, stage, settings, its)))
+        return solved(solution(context, stage, settings, receiver, values, between, work), report, stopped)
 
     with Device() as device:
-        return device.run(lambda context, report, stopped: solved(steps(context), report, stopped), progress, cancel)
+        return device.run(run, progress, cancel)
 
 
 def _values(target: ArrayLike | str | os.PathLike[str]) -> NDArray[np.float64]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Generator
 
 from ..base.errors import UserError
 from ..base.interrupts import interrupt_flag
@@ -36,14 +35,10 @@ def match(options: Match) -> int:
 
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         keep_programs(context.ctx)
-        stage = Stage(scene, scene.camera)
-
-        def steps() -> Generator[float, None, solving.Match]:
-            target = yield from solving.wanted(context, stage, settings, options.receiver, values, between or None)
-            solver = solving.Solver(context, stage, settings, target)
-            return (yield from solver.match(index, options.count or 10))
-
-        work = steps()
+        stage, count = Stage(scene, scene.camera), options.count or 10
+        work = solving.solution(
+            context, stage, settings, options.receiver, values, between or None, lambda its: its.match(index, count)
+        )
         while True:
             try:
                 progress(next(work), "comparing glasses")

@@ -7,10 +7,11 @@ blurred, so that a colour is still drawn to its place from several widths away.
 from __future__ import annotations
 
 import io
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -31,6 +32,7 @@ from .bake import placement
 from .frames import FrameRenderer, Picture
 from .gradient import INDEX, Gradient, gradient, nudged
 
+T = TypeVar("T")
 BINS = 16
 """Of maps that are compared in colour only."""
 _TEXELS, _FEWEST = 192, 8
@@ -418,6 +420,21 @@ class Solver:
 
     def _wanted(self, blur: float) -> np.ndarray:
         return _blurred(self.target.values.astype(float), blur).ravel()
+
+
+def solution(
+    context: Context,
+    stage: Stage,
+    settings: RenderSettings,
+    receiver: str,
+    values: np.ndarray | None,
+    between: Sequence[Sequence[float]] | None,
+    work: Callable[[Solver], Generator[float, None, T]],
+) -> Generator[float, None, T]:
+    """What `work` finds for the target that `wanted` makes of the rest, pausing with the share done."""
+    target = yield from mapped(wanted(context, stage, settings, receiver, values, between), partial(_within, 0.0, 0.05))
+    steps = work(Solver(context, stage, settings, target))
+    return (yield from mapped(steps, partial(_within, 0.05, 0.95)))
 
 
 def _within(begun: float, part: float, share: float) -> float:

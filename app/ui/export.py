@@ -245,15 +245,16 @@ def _bake(
 
 def _matched(context: Context, request: requests.MatchGlass, state: State, thread: ContextThread | None) -> ExportJob:
     """Which glasses come near the light of the scene on its first flat receiver, as a note."""
-    from ..render.solving import Solver, flat_receiver, wanted
+    from ..render.solving import flat_receiver, solution
 
     scene, notices = state.scene, FrameNotices()
     stage, receiver = Stage(scene, scene.camera), flat_receiver(scene)
     settings = _settings(state, state.viewport_size, photons=request.photons)
 
     def work() -> Iterator[float]:
-        target = yield from wanted(context, stage, settings, receiver, None, None)
-        found = yield from Solver(context, stage, settings, target).match(request.index, 3)
+        found = yield from solution(
+            context, stage, settings, receiver, None, None, lambda solver: solver.match(request.index, 3)
+        )
         near = (
             f"{g.name} (n_d {g.n_d:.4f}, V_d {g.V_d:.1f}) differs by {100.0 * g.error:.2g} %" for g in found.glasses
         )
