@@ -313,7 +313,7 @@ class Solver:
     def match(self, index: int, count: int = 10) -> Generator[float, None, Match]:
         """The glasses that object `index` may be of, pausing with the share done. Raises `UserError` where the target
         says nothing."""
-        entries = [e for e in catalogue.entries() if e.dispersion.is_dispersive]
+        entries = [e for e in catalogue.entries() if e.dispersion.is_dispersive and self._may_be(index, e.dispersion)]
         start = yield from self._scanned(index, entries)
         known: dict[str, Gradient] = {}
         curves = np.stack([_at_bins(entry.dispersion, self._edges) for entry in entries])
@@ -340,6 +340,14 @@ class Solver:
             Ranked(names[i], entries[i].dispersion.n_d, entries[i].dispersion.V_d, float(errors[i])) for i in order
         )
         return Match(ranked, self._around(columns, entries[best].dispersion))
+
+    def _may_be(self, index: int, dispersion: Dispersion) -> bool:
+        """Whether its data hold for every light of the scene."""
+        try:
+            set_dispersion(self.stage.scene, index, dispersion)
+        except UserError:
+            return False
+        return True
 
     def _scanned(self, index: int, entries: Sequence[catalogue.Entry]) -> Generator[float, None, int]:
         """Of glasses evenly spread over n_d, the one whose blurred light is nearest."""
