@@ -13,9 +13,10 @@ from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from ..edit.stored_photons import StoredPhotons as Photons
 from ..model.optics.lens_design import LensTable
+from ..model.plate_check import PlateReport
 from .catalogue import Glass, glass, glasses
 from .gradient import Gradient, gradient, gradients
-from .lenses import lens_table
+from .lenses import lens_check, lens_table
 from .pages import page
 from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render
@@ -38,6 +39,7 @@ __all__ = [
     "Match",
     "Photons",
     "Picture",
+    "PlateReport",
     "Ranked",
     "Scene",
     "Session",
@@ -53,6 +55,7 @@ __all__ = [
     "glasses",
     "gradient",
     "gradients",
+    "lens_check",
     "lens_table",
     "load",
     "match",

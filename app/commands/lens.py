@@ -1,4 +1,4 @@
-"""The commands about lenses: their figures as tables."""
+"""The commands about lenses and caustic plates: their figures as tables."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from .scenes import find_scene
 
 if TYPE_CHECKING:
     from ..model.optics.lens_design import Lens
-    from .table import LensTable
+    from ..model.plate_check import Cancelled, PlateReport, Report
+    from .table import LensCheck, LensTable
 
 
 def lens_table(options: LensTable) -> int:
@@ -35,3 +36,44 @@ def lens_at(path: Path, name: str | None = None) -> Lens:
     if path.suffix.lower() in SUFFIXES and name is None:
         return read_prescription(path)
     return lens_in(load_scene(path), name)
+
+
+def lens_check(options: LensCheck) -> int:
+    """Check a caustic plate and show what was found. Raises `UserError`."""
+    from ..base.image_io import check_suffix, write_image
+    from ..base.interrupts import INTERRUPTED, interrupt_flag
+    from ..base.progress import ProgressReporter
+
+    if options.output is not None:
+        check_suffix(options.output)
+    notes: list[str] = []
+    with interrupt_flag() as interrupted, ProgressReporter(options.plate.name) as progress:
+        report = check(options.plate, options.target, options.glass, options.distance, notes, progress, interrupted)
+    for sentence in dict.fromkeys(notes):
+        note(sentence)
+    show(table(options.plate.name, ("", f"lengths in its unit, glass {report.plate.glass.name}"), report.rows()))
+    if options.output is not None:
+        write_image(options.output, report.pictures())
+    return INTERRUPTED if interrupted() else 0
+
+
+def check(
+    plate: Path,
+    target: Path,
+    glass: str,
+    distance: float | None,
+    notes: list[str],
+    progress: Report | None = None,
+    cancelled: Cancelled | None = None,
+) -> PlateReport:
+    """See `model.plate_check.check_plate`, of files; what was assumed goes to `notes`."""
+    from ..model.io.picture_files import read_picture
+    from ..model.optics.index_file import find_glass
+    from ..model.plate_check import check_plate
+    from ..model.scene_objects import load_checked_mesh
+
+    rgb, more = read_picture(target)
+    made_of = find_glass(glass, plate.parent, "glass", notes)
+    mesh = load_checked_mesh(plate, None, notes)
+    notes += more
+    return check_plate(mesh, made_of, rgb, distance, progress, cancelled)

@@ -32,6 +32,7 @@ COMMANDS = {
     "inspect": ("table:Inspect", "inspect_report:inspect"),
     "glass": ("table:Glass", "glass:glass"),
     "lens table": ("table:LensTable", "lens:lens_table"),
+    "lens check": ("table:LensCheck", "lens:lens_check"),
     "doctor": ("table:Doctor", "doctor:doctor"),
     "bench": ("measuring_table:Bench", "bench:bench"),
     "stress": ("measuring_table:Stress", "stress:stress"),
@@ -45,7 +46,7 @@ COMMANDS = {
 modules."""
 _GROUPS = {
     "farm": "Render on many workers, here or on a Dask cluster; needs the extra 'farm'.",
-    "lens": "Figures of lenses.",
+    "lens": "Figures of lenses, and of plates that draw pictures with light.",
 }
 """Commands of two words, by their first: its help."""
 _HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 120}

@@ -495,6 +495,21 @@ class LensTable(ReadsScenes):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LensCheck:
+    """Check whether a caustic plate draws its picture: focus, error, efficiency, colour blur, tolerances."""
+
+    plate: Path = argument("PLATE", "A mesh (.stl, .ply, .obj) with one flat side and, across from it, a shaped one.")
+    glass: str = option("GLASS", "What it is made of; default: PMMA.", complete=completion.glasses, default="PMMA")
+    distance: float | None = option(
+        "D",
+        "From the plate's far side to the screen, in the mesh's unit; default: where it is most like the target.",
+        options.number(lambda value: 0.0 < value < 1e9, "more than 0", " in the mesh's unit, for example 300"),
+    )
+    output: Path | None = target("OUT", "Write the target and, next to it, what the plate draws.", default=None)
+    target: Path = option("PICTURE", "The picture that it was made for.", default=MISSING)
+
+
+@dataclass(frozen=True, kw_only=True)
 class Doctor:
     """Check OpenGL, its limits and the packages, with a remedy for what is missing."""
 
