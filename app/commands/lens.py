@@ -51,7 +51,7 @@ def lens_check(options: LensCheck) -> int:
         report = check(options.plate, options.target, options.glass, options.distance, notes, progress, interrupted)
     for sentence in dict.fromkeys(notes):
         note(sentence)
-    show(table(options.plate.name, ("", f"lengths in its unit, glass {report.plate.glass.name}"), report.rows()))
+    show(table(options.plate.name, ("what", f"lengths in its unit, glass {report.plate.glass.name}"), report.rows()))
     if options.output is not None:
         write_image(options.output, report.pictures())
     return INTERRUPTED if interrupted() else 0
