@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ..base.errors import UserError
 from ..base.generators import finished
 from .arguments import Count, Size, check_scene, settings_of
 from .device import Cancel, Device, Progress
@@ -34,31 +35,15 @@ def page(
     of the page; default: the scene's name and what its file begins by saying. Once `cancel()` returns true, `UserError`
     says so. Raises `UserError`.
     """
-    check_scene(scene)
-    with Device() as device:
-        return device.run(page_work(scene, receiver, size, photons, seed, title, description), progress, cancel)
-
-
-def page_work(
-    scene: Scene,
-    receiver: str | None,
-    size: Size | None = None,
-    photons: Count | None = None,
-    seed: int | None = None,
-    title: str | None = None,
-    description: str | None = None,
-) -> Callable[[Context, Callable[[float, str], None], Callable[[], bool]], Page]:
-    """What a device does for `page`. Raises `UserError` for arguments that are none."""
-    from ..base.errors import UserError
     from ..edit.parameters import Stage
     from ..render.page.page import DEFAULT_PHOTONS, page_size, page_steps, words_of
 
+    check_scene(scene)
     model = scene._model
     settings = settings_of(scene, size=size or page_size(model), photons=photons or DEFAULT_PHOTONS, seed=seed)
     words = words_of(model, scene._file)
-    words = replace(
-        words, title=title or words.title, description=words.description if description is None else description
-    )
+    said = words.description if description is None else description
+    words = replace(words, title=title or words.title, description=said)
 
     def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Page:
         def told(share: float) -> None:
@@ -68,4 +53,5 @@ def page_work(
 
         return finished(page_steps(context, Stage(model, model.camera), settings, receiver, words), told)
 
-    return work
+    with Device() as device:
+        return device.run(work, progress, cancel)

@@ -17,6 +17,7 @@ from ..edit import camera_controls
 from ..model.scene import Camera
 from ..model.scene_camera import camera_values
 from .device import Device
+from .pages import page
 from .picture import Picture
 from .scene import Scene
 from .widget import Front, lack_of_front_end
@@ -39,7 +40,11 @@ _SPECTRUM_S = 0.12
 _NAP_S = 0.2
 """How often a view at rest checks whether a cell has edited the scene."""
 _FIRST_S = 30.0
-"""How long a cell waits for the picture that stays in a saved notebook."""
+"""How long a cell waits for its first picture, which stays where widgets are not shown."""
+_PAGE_AFTER_S = 3.0
+"""The page that stays in a saved notebook is made when nothing has moved for so long."""
+PAGE_SIZE, PAGE_PHOTONS = (480, 270), 20_000
+"""Of that page, which every saving of the notebook writes."""
 
 
 class Viewed(Protocol):
@@ -73,7 +78,8 @@ class View:
     Drag to walk round, with Shift to move across, turn the wheel to come nearer, double-click to go back; each object
     of glass has a slider for its dispersion, which traces nothing; the spectrum under the cursor is that of the caustic
     and of direct light, W/(unit² nm). What is done in the view is done to the session's `scene`, and what cells do to
-    that is shown. Without anywidget, or without a kernel, it is a picture with a sentence that says so.
+    that is shown. In a saved notebook it is a page whose dispersion can be dragged; so it is without anywidget or a
+    kernel, with a sentence that says so.
     """
 
     def __init__(self, session: Viewed, front: Callable[..., Front] | None = None) -> None:
@@ -92,6 +98,9 @@ class View:
         self._hover: tuple[float, float] | None = None
         self._answered: tuple[object, ...] = ()
         self._light: dict[str, Any] = {}
+        self._pager: threading.Thread | None = None
+        self._paged: object = None
+        """What the page that is kept shows, or could not."""
         if self._why is None:
             self._front = (front or Front)(self._handle, session._size)
             self._front.glasses(self._glasses())
@@ -180,7 +189,31 @@ class View:
         front.tell(engine.problem or "")
         is_sent = self._send_picture(front, engine, is_moving)
         is_answered = is_moving or self._answer_hover(front, engine)
-        return engine.is_idle and is_sent and is_answered and not is_moving
+        rests = engine.is_idle and is_sent and is_answered and not is_moving
+        if rests:
+            self._keep_page(engine, front)
+        return rests
+
+    def _keep_page(self, engine: LiveEngine, front: Front) -> None:
+        """Let a thread with a context of its own make the page of what is shown, unless it is kept or being made."""
+        at_rest_s = time.monotonic() - self._moved_s
+        if engine.inputs is self._paged or at_rest_s < _PAGE_AFTER_S or (self._pager and self._pager.is_alive()):
+            return
+        self._paged, scene = engine.inputs, self._session.scene.copy()
+        self._pager = threading.Thread(target=lambda: self._make_page(scene, front), daemon=True)
+        self._pager.start()
+
+    def _make_page(self, scene: Scene, front: Front) -> None:
+        def moves() -> bool:
+            return self._ending.is_set() or time.monotonic() - self._moved_s < _PAGE_AFTER_S
+
+        try:
+            made = page(scene, size=PAGE_SIZE, photons=PAGE_PHOTONS, cancel=moves).html
+        except UserError:  # given up, or of this scene there can be none
+            made = ""
+            self._paged = None if moves() else self._paged
+        if not self._ending.is_set():
+            front.keep(made)
 
     def _send_picture(self, front: Front, engine: LiveEngine, is_moving: bool) -> bool:
         """Whether the browser has, or is being sent, the picture as it is."""
@@ -200,8 +233,6 @@ class View:
         self._version, self._picture, self._sent_s = version, frame.data, now
         self._sent += 1
         front.send({"kind": "picture", "number": self._sent} | frame.facts, frame.data)
-        if frame.facts["done"] or not self._shown.is_set():
-            front.keep(frame.data)
         self._shown.set()
         return not self._frames.is_settling
 
@@ -244,10 +275,12 @@ class View:
             if self._picture:
                 bundle["image/jpeg"] = base64.b64encode(self._picture).decode()
             return bundle | {"text/plain": repr(self)}
-        png = base64.b64encode(self._session.render()._repr_png_()).decode()
-        caption = repr(self)
-        page = f'<img src="data:image/png;base64,{png}" alt="The rendered scene"/><p><small>{caption}</small></p>'
-        return {"text/html": page, "image/png": png, "text/plain": caption}
+        png, caption = base64.b64encode(self._session.render()._repr_png_()).decode(), repr(self)
+        try:
+            shown = page(self._session.scene, size=PAGE_SIZE, photons=PAGE_PHOTONS)._repr_html_()
+        except UserError:  # this scene can be no page
+            shown = f'<img src="data:image/png;base64,{png}" alt="The rendered scene"/>'
+        return {"text/html": f"{shown}<p><small>{caption}</small></p>", "image/png": png, "text/plain": caption}
 
     def __repr__(self) -> str:
         name = self._session.scene.name
@@ -260,6 +293,8 @@ class View:
         self._ending.set()
         self._woken.set()
         self._thread.join()
+        if self._pager is not None:
+            self._pager.join()
         frames, self._frames = self._frames, None
         if frames is not None:
             self._session._running.run(lambda context, report, stopped: frames.release())

@@ -37,7 +37,7 @@ class Front:
             "size": traitlets.List().tag(sync=True),
             "glasses": traitlets.List().tag(sync=True),
             "told": traitlets.Unicode("").tag(sync=True),
-            "still": traitlets.Bytes(b"").tag(sync=True),
+            "page": traitlets.Unicode("").tag(sync=True),
         }
         # Made here, so that nothing of Jupyter is imported before somebody asks for a view.
         kind = type("SpectraSplatView", (anywidget.AnyWidget,), kept)
@@ -58,9 +58,10 @@ class Front:
         if self.widget.told != text:
             self.widget.told = text
 
-    def keep(self, picture: bytes) -> None:
-        """A JPEG file that stays in saved notebooks and pages, for readers without a kernel."""
-        self.widget.still = picture
+    def keep(self, page: str) -> None:
+        """A page that stays in saved notebooks, for readers without a kernel; "" for none."""
+        if self.widget.page != page:
+            self.widget.page = page
 
     def mimebundle(self) -> dict[str, Any]:
         """For a cell's output."""

@@ -168,7 +168,7 @@ class RenderPicture(Request):
 
 @dataclass(frozen=True)
 class Bake(Request):
-    """Write a receiver's caustic map with its placement (`.json` beside it): .exr or .png."""
+    """Write a receiver's caustic map with its placement (`.json` beside it): .exr or .png; or its page: .html."""
 
     path: Path
     receiver: str

@@ -23,6 +23,7 @@ from ..gpu.context_thread import no_thread
 from ..model.scene import RenderDefaults
 from ..model.settings import RenderSettings
 from ..passes.display import Display
+from ..render.export_caustic import PAGE_SUFFIXES
 from ..render.notices import FrameNotices, frame_notices
 from .export_job import Course, ExportJob, Words
 from .file_writer import FileWriter
@@ -131,6 +132,10 @@ class Exports:
         shown_size = state.viewport_size if isinstance(request, requests.Bake) else size
         stage = Stage(state.scene, state.camera_for(shown_size), exposure_ev, state.solo_nm)
         match request:
+            case requests.Bake() if request.path.suffix.lower() in PAGE_SUFFIXES:
+                work = _page(context, request, state, exposure_ev)
+                saved = f"Saved {name}: any browser opens it."
+                return ExportJob(Words(f"Page: {name}", saved, _NOTHING.format("a page")), work, notices, thread)
             case requests.Bake():
                 settings = _settings(state, size, photons=request.photons)
                 work = _bake(context, request, stage, settings, notices)
@@ -265,6 +270,23 @@ def _matched(context: Context, request: requests.MatchGlass, state: State, threa
         f"Glass of {name}", f"Glasses that light '{receiver}' most alike:", "No glass was looked for any more."
     )
     return ExportJob(words, work(), notices, thread)
+
+
+def _page(context: Context, request: requests.Bake, state: State, exposure_ev: float) -> Iterator[float]:
+    from ..render.page.page import check_page, check_page_path, page_size, page_steps, words_of
+
+    scene, size = state.scene, page_size(state.scene)
+    stage = Stage(scene, state.camera_for(size), exposure_ev)
+    check_page_path(request.path)
+    check_page(scene, request.receiver)
+    look = {"exposure_ev": scene.render.exposure_ev, "glare": scene.render.glare}
+    settings = _settings(state, size, photons=request.photons, **look)
+
+    def work() -> Iterator[float]:
+        page = yield from page_steps(context, stage, settings, request.receiver, words_of(scene))
+        page.to_html(request.path)
+
+    return work()
 
 
 def _animate(

@@ -127,13 +127,20 @@ function render({ model, el }) {
     raw.buffer ? new Uint8Array(raw.buffer, raw.byteOffset, raw.byteLength) : new Uint8Array(raw);
   const decoded = (raw) => createImageBitmap(new Blob([bytesOf(raw)], { type: "image/jpeg" }));
   const draw = (picture) => (brush.drawImage(picture, 0, 0, width, height), picture.close());
-  async function onStill() {
-    const still = model.get("still");
-    if (shown || !still || !still.byteLength) return;
-    const picture = await decoded(still);
-    if (shown) return;
-    draw(picture);
-    status.textContent = "A picture from when it ran; run the cell to walk round.";
+  // What a saved notebook shows: a page that needs no kernel (docs/pages.md).
+  const kept = document.createElement("iframe");
+  kept.className = "kept";
+  kept.title = "The caustic, whose dispersion can be dragged";
+  function onPage() {
+    const page = model.get("page");
+    if (shown || !page) return;
+    kept.srcdoc = page;
+    el.prepend(kept);
+    stage.hidden = side.hidden = true;
+  }
+  function onLive() {
+    kept.remove();
+    stage.hidden = side.hidden = false;
   }
   async function onMessage(message, buffers) {
     if (message.kind === "light") {
@@ -144,6 +151,7 @@ function render({ model, el }) {
       const picture = await decoded(buffers[0]);
       send({ kind: "seen", number: message.number });
       if (message.number < shown) return;
+      if (!shown) onLive();
       shown = message.number;
       draw(picture);
       status.textContent = statusOf(message);
@@ -192,7 +200,7 @@ function render({ model, el }) {
   model.on("change:told", onTold);
   onGlasses();
   onTold();
-  onStill();
+  onPage();
 
   // ---- mouse
 

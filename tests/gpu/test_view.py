@@ -34,7 +34,7 @@ class Browser:
         self.pictures: list[tuple[dict[str, Any], np.ndarray]] = []
         self.lights: list[dict[str, Any]] = []
         self.listed: list[dict[str, Any]] = []
-        self.told, self.kept = "", b""
+        self.told, self.kept = "", ""
 
     def send(self, message: dict[str, Any], data: bytes | None = None) -> None:
         json.dumps(message, allow_nan=False)
@@ -50,8 +50,8 @@ class Browser:
     def glasses(self, listed: list[dict[str, Any]]) -> None:
         self.listed = listed
 
-    def keep(self, picture: bytes) -> None:
-        self.kept = picture
+    def keep(self, page: str) -> None:
+        self.kept = page
 
     def tell(self, text: str) -> None:
         self.told = text or self.told
@@ -230,18 +230,24 @@ def test_the_widget_carries_messages_both_ways(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(front.widget, "_send", lambda message, buffers=None: sent.append((message, buffers)))
     front.send({"kind": "picture"}, b"jpeg")
     assert sent == [({"method": "custom", "content": {"kind": "picture"}}, [b"jpeg"])]
-    front.keep(b"still")
-    assert front.widget.get_state()["still"] == b"still"
+    front.keep("<p>")
+    assert front.widget.get_state()["page"] == "<p>"
     front.glasses([{"object": "a", "gain": 1.0, "most": 10.0}])
     assert front.widget.glasses[0]["object"] == "a"
 
 
-def test_a_displayed_view_keeps_a_picture_for_readers_without_a_kernel(live: tuple[ss.Session, Browser]) -> None:
+def test_a_displayed_view_keeps_a_page_for_readers_without_a_kernel(
+    live: tuple[ss.Session, Browser], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in (("_PAGE_AFTER_S", 0.0), ("PAGE_SIZE", (64, 36)), ("PAGE_PHOTONS", 2000)):
+        monkeypatch.setattr(view_module, name, value)
     session, _ = live
     view, browser = viewed(session)
     bundle = view._repr_mimebundle_()
     assert "application/vnd.jupyter.widget-view+json" in bundle
-    assert base64.b64decode(bundle["image/jpeg"])[:2] == browser.kept[:2] == b"\xff\xd8"
+    assert base64.b64decode(bundle["image/jpeg"])[:2] == b"\xff\xd8"
+    until(lambda: browser.kept or None)
+    assert browser.kept.startswith("<!DOCTYPE html>") and '"scene": "prism"' in browser.kept
     view.close()
     assert not view.is_live and repr(view).endswith(", closed")
 

@@ -17,6 +17,7 @@ from ...gpu.records import LATTICE_BIT
 from ...gpu.spectral_groups import samples_of
 from ...model.optics.colorimetry import VISIBLE_NM
 from ...passes.plane_frame import PlaneFrame, plane_frame
+from .picture import WINDOW_TEXELS
 
 if TYPE_CHECKING:
     from ..viewer.live_light import LiveLight
@@ -170,7 +171,7 @@ def _window(photons: dict[str, np.ndarray], beams: dict[str, np.ndarray]) -> dic
         "v0": float(low[1]),
         "u1": float(high[0]),
         "v1": float(high[1]),
-        "texel": float(side.max()) / 512.0,
+        "texel": float(side.max()) / WINDOW_TEXELS,
     }
 
 

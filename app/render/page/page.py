@@ -32,7 +32,7 @@ from ..lit_receiver import up_of
 from ..viewer.still_engine import finishing, still_engine
 from .document import document
 from .light import landed, page_light
-from .picture import page_picture, pixels_to_plane, weight_of
+from .picture import page_picture, pixels_to_plane, seen_window, weight_of
 from .spectra import GAIN_MAX, Glasses, offered_spectra
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class PageWords:
 def words_of(scene: Scene, path: Path | None = None) -> PageWords:
     """The scene's name, and what its file begins by saying."""
     said = ""
-    if path is not None and path.suffix.lower() == ".toml":
+    if path is not None and path.suffix.lower() == ".toml" and files.is_file(path):
         lines = files.read_text(path, files.SETTINGS_BYTES).splitlines()
         said = " ".join(line.lstrip("# ") for line in itertools.takewhile(lambda line: line.startswith("#"), lines))
     title = scene.name.replace("_", " ")
@@ -157,7 +157,7 @@ def page_steps(
         size = settings.width, settings.height
         item = light.item
         to_plane = pixels_to_plane(stage.camera, *size, light.frame, live.buffers)
-        weight = weight_of(context, live.buffers, stage.camera, size, item, to_plane)
+        weight = weight_of(context, live.buffers, stage.camera, size, item)
     finally:
         engine.release()
     rgb, caustic = yield from _still(context, stage, settings)
@@ -169,6 +169,7 @@ def page_steps(
     tables, spectra = _spectra(scene)
     arrays = {**light.arrays, **picture.arrays, **shapes, **tables, **groups.arrays}
     head = light.head | groups.head | spectra | _said(scene, item, words)
+    head["window"] = seen_window(head["window"], to_plane, weight)
     head |= {"camera": camera, "meshes": meshes, "exposure_ev": exposure, "photons_emitted": settings.photons}
     material = scene.objects[item].material
     if material.reflectance is not None:

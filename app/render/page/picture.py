@@ -11,13 +11,15 @@ import numpy as np
 from ...gpu import bindings, shader
 from ...gpu.context import Context
 from ...gpu.scene_buffers import SceneBuffers
-from ...model.scene import Camera, SceneObject
+from ...model.scene import Camera
 from ...model.scene_camera import camera_frame
 from ...passes.camera_records import camera_parameters
 from ...passes.first_surfaces import FirstSurfaces
 from ...passes.plane_frame import PlaneFrame
 
 SUBPIXELS = 4
+WINDOW_TEXELS = 512
+"""Along the longer side of a page's window, about."""
 _GAMMA = 2.4
 _HEADROOM = 4.0
 """How many times display white the base may be."""
@@ -70,11 +72,9 @@ def pixels_to_plane(camera: Camera, width: int, height: int, frame: PlaneFrame, 
     return inverse / np.abs(inverse).max()
 
 
-def weight_of(
-    context: Context, buffers: SceneBuffers, camera: Camera, size: tuple[int, int], item: int, to_plane: np.ndarray
-) -> np.ndarray:
+def weight_of(context: Context, buffers: SceneBuffers, camera: Camera, size: tuple[int, int], item: int) -> np.ndarray:
     """What a pixel shows of a unit of irradiance on object `item`: reflectance over π where the camera sees it
-    directly, (H, W, 3). `to_plane`: `pixels_to_plane`."""
+    directly, (H, W, 3)."""
     width, height = (SUBPIXELS * side for side in size)
     surfaces = FirstSurfaces(context.ctx, buffers)
     parameters = camera_parameters(buffers, camera, width, height)
@@ -85,14 +85,22 @@ def weight_of(
     finally:
         context.ctx.detect_framebuffer(0).use()
         shader.release(surfaces, uniform)
-    weight = seen[..., None] * (_colours(buffers.scene.objects[item], seen.shape, to_plane, buffers, item) / np.pi)
-    mean: np.ndarray = weight.reshape(size[1], SUBPIXELS, size[0], SUBPIXELS, -1).mean(axis=(1, 3))
-    return mean
+    material = buffers.scene.objects[item].material
+    # Spectra of the caustic hold a reflectance that is a spectrum.
+    colour = np.ones(3) if material.reflectance is not None else np.asarray(material.reflectance_rgb, float)
+    weight: np.ndarray = seen.reshape(size[1], SUBPIXELS, size[0], SUBPIXELS).mean(axis=(1, 3))[..., None] * colour
+    return weight / np.pi
 
 
-def _colours(
-    thing: SceneObject, shape: tuple[int, ...], to_plane: np.ndarray, buffers: SceneBuffers, item: int
-) -> np.ndarray:
-    """Reflectance, linear Rec.709, as far as spectra of the caustic do not hold it."""
-    material = thing.material
-    return np.ones(3) if material.reflectance is not None else np.asarray(material.reflectance_rgb, float)
+def seen_window(lit: dict[str, float], to_plane: np.ndarray, weight: np.ndarray) -> dict[str, float]:
+    """The part of the window `lit` that the camera sees, where it sees any: its map has the finer texels there."""
+    rows, columns = np.nonzero(weight.any(axis=2))
+    u, v, w = to_plane @ np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])
+    if not len(rows):
+        return lit
+    low = np.maximum([(u / w).min(), (v / w).min()], [lit["u0"], lit["v0"]])
+    high = np.minimum([(u / w).max(), (v / w).max()], [lit["u1"], lit["v1"]])
+    if (high <= low).any():
+        return lit
+    ends = dict(zip(("u0", "v0", "u1", "v1"), (*low.tolist(), *high.tolist()), strict=True))
+    return ends | {"texel": float((high - low).max()) / WINDOW_TEXELS}

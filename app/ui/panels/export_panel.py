@@ -176,6 +176,9 @@ def _bake(state: State, view_model: ViewModel, idle: bool) -> None:
     if widgets.button("Bake map…", tip=tip, enabled=idle, width=-1):
         suffixes = (*OFFERED_LINEAR, *OFFERED_SHOWN)
         _ask("Bake caustic map", suffixes, view_model, _bake_request, f"_{_choices.receiver}")
+    tip = "The caustic as one file for browsers, in which its dispersion can be dragged, of 100 thousand photons."
+    if widgets.button("Save page…", tip=tip, enabled=idle, width=-1):
+        _ask("Save page", (".html",), view_model, _page_request)
 
 
 def _animation(state: State, view_model: ViewModel, idle: bool) -> State:
@@ -239,6 +242,10 @@ def _render_request(state: State, path: Path) -> Request:
 
 def _bake_request(state: State, path: Path) -> Request:
     return Bake(path, _choices.receiver, _size(_choices.map_size, state), int(_choices.map_photons))
+
+
+def _page_request(state: State, path: Path) -> Request:
+    return Bake(path, _choices.receiver, state.viewport_size, 100_000)
 
 
 def _animation_request(state: State, path: Path) -> Request:
