@@ -96,6 +96,12 @@ def viewed(session: ss.Session) -> tuple[View, Browser]:
     return View(session, front), made[0]
 
 
+@pytest.fixture(autouse=True)
+def no_pages(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nothing asks for the page of a saved notebook, none is made."""
+    monkeypatch.setattr(view_module, "_PAGE_AFTER_S", 1e9)
+
+
 @pytest.fixture(scope="module")
 def live() -> Iterator[tuple[ss.Session, Browser]]:
     with ss.Session(ss.load("prism"), size=SIZE, photons=20_000, spp=2) as session:
