@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -51,7 +52,8 @@ def page(
                 raise UserError("the page was given up before it was whole")
             report(share, "making the page")
 
-        return finished(page_steps(context, Stage(model, model.camera), settings, receiver, words), told)
+        with closing(page_steps(context, Stage(model, model.camera), settings, receiver, words)) as steps:
+            return finished(steps, told)
 
     with Device() as device:
         return device.run(work, progress, cancel)

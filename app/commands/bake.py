@@ -93,6 +93,7 @@ def _finished(
             value: T = finished.value
             return value
         if interrupted():
+            steps.close()
             print("spectrasplat: nothing was written: it is whole or not at all", file=sys.stderr)
             return None
 

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 _LIT = 0.998
 """Share of the light that a page's window holds."""
+_MOST = 6e4
+"""Of columns: what half floats hold. More is a numerical accident."""
 _MARGIN = 0.04
 """Of the window's side, round it."""
 
@@ -108,7 +110,8 @@ def _photons(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -
     weight = 1.0 if stored is None else stored.pass_photons * stored.store.rounds / stored.store.rounds_of_pass
 
     def along(name: str) -> np.ndarray:
-        return (records[name][:, :3].astype(float) @ frame.axes.T / scale).astype("f2")
+        columns = records[name][:, :3].astype(float) @ frame.axes.T / scale
+        return np.clip(columns, -_MOST, _MOST).astype("f2")
 
     columns = [along(f"dposition_dvar{g}") for g in range(groups)]
     return {
