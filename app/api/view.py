@@ -209,7 +209,7 @@ class View:
 
         try:
             made = page(scene, size=PAGE_SIZE, photons=PAGE_PHOTONS, cancel=moves).html
-        except UserError:  # given up, or of this scene there can be none
+        except (UserError, RuntimeError):  # given up, the interpreter ends, or of this scene there can be none
             made = ""
             self._paged = None if moves() else self._paged
         if not self._ending.is_set():

@@ -99,7 +99,7 @@ def viewed(session: ss.Session) -> tuple[View, Browser]:
 @pytest.fixture(autouse=True)
 def no_pages(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where nothing asks for the page of a saved notebook, none is made."""
-    monkeypatch.setattr(view_module, "_PAGE_AFTER_S", 1e9)
+    monkeypatch.setattr(view_module, "_PAGE_AFTER_S", float("inf"))
 
 
 @pytest.fixture(scope="module")
