@@ -63,6 +63,17 @@ class SurfaceFeatures:
         ),
     )
     """Some surface carries thin films, or is of metal: its shares are looked up by wavelength and angle."""
+    varied_films: bool = feature(
+        "films of varying thickness",
+        lambda facts: any(item.material.film.profile for item in facts.films),
+        symbol="FILM_VARIES",
+        why=lambda facts: f"on {names(item for item in facts.films if item.material.film.profile)}",
+        why_not="no film's thickness varies",
+        names=("wedge_at", "film_share_of_thickest"),
+        cost="two lookups more for each of a film's",
+        requires=("films",),
+    )
+    """Some film is thicker in one place than in another."""
     absorption: bool = feature(
         "absorption",
         lambda facts: bool(facts.absorbing),
@@ -75,14 +86,14 @@ class SurfaceFeatures:
     )
     rough: bool = feature(
         "rough surfaces",
-        lambda facts: any(item.material.is_rough for item in facts.glass),
+        lambda facts: bool(facts.having(lambda material: material.is_rough)),
         symbol="ROUGH_SURFACES",
         why=lambda facts: f"of {names(facts.having(lambda material: material.is_rough))}",
-        why_not="all glass is polished",
+        why_not="all glass and all mirrors are polished",
         names=("lobe_axes", "smith_share", "microfacet_numbers", "regained"),
         requires=("dielectrics",),
     )
-    """Some glass has a ground surface, whose microfacets turn paths by chance."""
+    """Some glass or mirror has a ground surface, whose microfacets turn paths by chance."""
     crystals: bool = feature(
         "crystals",
         lambda facts: bool(facts.crystals),

@@ -118,7 +118,8 @@ def _decided(text: str, values: Mapping[str, int]) -> bool | str:
                 if operand is absorbing and not any("(" in before for before in left):
                     return absorbing
                 if operand is absorbing:
-                    return text  # what is called before it may do something
+                    # What is called before it may do something.
+                    return f" {sign} ".join([*left, str(absorbing).lower()])
                 if isinstance(operand, str):
                     left.append(operand)
             if left == [operand.strip() for operand in operands]:

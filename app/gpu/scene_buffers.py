@@ -14,7 +14,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..features.features import Features
 from ..model.contacts import overlapping_solids
-from ..model.film_stacks import film_tables, scene_media
+from ..model.film_stacks import film_tables, film_thickness, scene_media
 from ..model.materials.grating import WAVELENGTH
 from ..model.optics import rough_surfaces
 from ..model.optics.colorimetry import VISIBLE_NM, mirror_reflectance
@@ -35,7 +35,7 @@ from .grating_records import grating_tables, grating_texels
 from .records import NONE
 from .scene_geometry import SceneGeometry
 from .scene_motion import MovingTriangles, ObjectPlaces, WorldMeshes
-from .scene_records import CRYSTAL, OBJECT, PIECE
+from .scene_records import CRYSTAL, OBJECT, PIECE, WEDGE
 from .scene_texels import SceneTexels, spectra_texture
 from .spectral_groups import SAMPLES, Groups, index_slope, samples_of
 from .texture_store import textured_objects
@@ -229,7 +229,7 @@ class SceneBuffers:
 
     def _move_record(self, index: int, item: SceneObject) -> None:
         record = self._records[index : index + 1].copy()
-        sizes = record["colour"][:, 3 if item.material.is_mirror else 2]
+        sizes = record["colour"][:, 2]
         sized = item.material.is_mirror or item.material.dispersion is not None
         if sized and sizes[0] < UNBOUNDED:
             sides = np.abs(self.places.matrices[index, :, :3]) @ self.world_meshes.half_size(index)
@@ -239,6 +239,8 @@ class SceneBuffers:
             self.texels.write(
                 "GRATINGS", int(record["weight_row"][0]), grating_texels(item, self.grating_rows.get(index))
             )
+        if record["colour"][0, 0] < 0.0:
+            self.texels.write("WEDGES", int(-1.0 - record["colour"][0, 0]), self._wedge(item))
         if item.material.polarises:
             number = int(record["receiver"][0]) // _CRYSTAL_TEXELS
             self._crystals["axis"][number] = item.material.axis_in_world(item.object_to_world)
@@ -268,6 +270,7 @@ class SceneBuffers:
         self.media = media = scene_media(self.scene)
         weights: list[np.ndarray] = []
         gratings: list[np.ndarray] = []
+        wedges: list[np.ndarray] = []
         self._crystals = CRYSTAL.zeros(sum(item.material.polarises for item in self.scene.objects))
         crystals = 0
         absorbers: dict[bytes, int] = {}
@@ -286,15 +289,20 @@ class SceneBuffers:
             record["first_triangle"] = self.first_triangle[index]
             material = item.material
             record["kind"] = material.met_as
-            record["colour"][:3] = material.reflectance_rgb
             if material.receives:
+                record["colour"][:3] = material.reflectance_rgb
                 record["receiver"] = self.receivers.index(index)
             size = UNBOUNDED
             if material.is_specular and (material.is_rough or material.polarises or not item.mesh.is_faceted):
                 size = self.space.scale * 0.5 * float(np.linalg.norm(np.ptp(self.world_meshes[index].vertices, axis=0)))
+            if material.is_specular:
+                width = material.microfacet_width
+                table = rough_surfaces.first_row_of(width, widths, material.is_mirror) if width > 0.0 else 0
+                if material.film is not None and material.film.profile is not None:
+                    width = -1.0 - WEDGE.stride // 16 * len(wedges)
+                    wedges.append(self._wedge(item))
+                record["colour"] = width, films.number.get(index, 0), size, table
             if material.is_mirror:
-                record["colour"][1] = films.number.get(index, 0.0)
-                record["colour"][3] = size
                 record["weight_row"] = len(weights)
                 weights.append(mirror_reflectance(material.reflectance_rgb, nm))
             if material.dispersion is None and (self.features.environment_lights or self.features.bounces):
@@ -304,10 +312,6 @@ class SceneBuffers:
                 gratings.append(grating_texels(item, self.grating_rows.get(index)))
             if material.dispersion is not None:
                 record["medium"] = media.index(material.dispersion)
-                record["colour"][1:] = films.number.get(index, 0.0), size, material.dispersion.n_d
-                if material.is_rough:
-                    width = material.microfacet_width
-                    record["colour"][:2] = width, rough_surfaces.GLASS_ROWS * widths.index(width)
                 if index in stack_bits:
                     record["stack_bit"] = stack_bits[index]
                 if material.dispersion in self.groups.glasses and self.groups.count and not material.thin:
@@ -328,6 +332,8 @@ class SceneBuffers:
         self._sections["OBJECTS"] = self._records = records
         if gratings:
             self._sections["GRATINGS"] = np.concatenate(gratings)
+        if wedges:
+            self._sections["WEDGES"] = np.concatenate(wedges)
         if crystals:
             self._sections["CRYSTALS"] = self._crystals
         orders = [len(item.material.orders) for item in self.scene.objects if isinstance(item.material, Grating)]
@@ -395,6 +401,14 @@ class SceneBuffers:
             record["retardance_um"] = material.retardance_nm / 1000.0
         elif other.is_dispersive and self.groups.count:
             record["group"] = self.groups.group[self.groups.glasses.index(other)]
+
+    def _wedge(self, item: SceneObject) -> np.ndarray:
+        """How thick an object's film is where."""
+        record = WEDGE.zeros(1)
+        origin, bend, slope, least = film_thickness(item)
+        record["origin"], record["bend"] = self.space.to_gpu(origin), bend / self.space.scale**2
+        record["slope"], record["least"] = slope / self.space.scale, least
+        return record
 
     def _draws(self) -> np.ndarray:
         """Each light's density of random wavelengths as a running integral, (lights, SAMPLES); none where none are

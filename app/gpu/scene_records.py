@@ -62,8 +62,9 @@ OBJECT = Struct(
         Field(
             "colour",
             "vec4",
-            "linear Rec.709 reflectance (diffuse); mirror, y: film, w: size; dielectric: GGX's width, its table's row "
-            "(polished: its film, 1 + its first row; 0: none), size (half of its bounds' diagonal, GPU units), n_d",
+            "linear Rec.709 reflectance (diffuse); of what is specular GGX's width (0: polished; below 0: - 1 - the "
+            "texel of its film's Wedge), its film, 1 + its "
+            "first row (0: none), its size (half of its bounds' diagonal, GPU units), its width's table's row",
         ),
     ),
     texels=True,
@@ -94,6 +95,16 @@ GRATING_ORDER = Struct(
     ),
     texels=True,
 )
+WEDGE = Struct(
+    "Wedge",
+    (
+        Field("origin", "vec3", "GPU space"),
+        Field("bend", "float", "of a film's thickness, as a share of the thickest place's: 1/GPU unit²"),
+        Field("slope", "vec3", "likewise, 1/GPU unit"),
+        Field("least", "float", "thickness at the origin"),
+    ),
+    texels=True,
+)
 CRYSTAL = Struct(
     "Crystal",
     (
@@ -106,4 +117,4 @@ CRYSTAL = Struct(
     ),
     texels=True,
 )
-SCENE_STRUCTS = (TRIANGLE, SOLID, PIECE, OBJECT, GRATING, GRATING_ORDER, CRYSTAL)
+SCENE_STRUCTS = (TRIANGLE, SOLID, PIECE, OBJECT, GRATING, GRATING_ORDER, WEDGE, CRYSTAL)

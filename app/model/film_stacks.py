@@ -13,8 +13,10 @@ from .optics.glass import Dispersion
 from .optics.metals import find_metal
 from .optics.spectral_tables import SpectralAxis
 from .optics.thin_films import ABOVE, AIR, BELOW, Stack, power
-from .scene import Scene
+from .scene import Scene, SceneObject
 
+_THICKNESSES = (1.0, 0.8, 0.6, 0.4, 0.2)
+"""Parts of the thickness of a film that varies, whose curves are known."""
 _COSINES = (1.0, 0.75, 0.5)
 _BLUR_NM = 12
 """Ripples finer than this are no colours to the eye; behind a prism they are shown blurred."""
@@ -58,7 +60,7 @@ class FilmTables:
     """1 + the first row of each object's film in air, those without left out. FILM_MEDIUM_ROWS times FILM_SLOTS[medium]
     further on begin those in a medium of `scene_media`."""
     rows: np.ndarray
-    """`Stack.table` of each film in each medium, one after the other."""
+    """`Stack.table` of each film in each medium, one after the other; before those of one that varies, its `waves`."""
     defines: dict[str, int | str]
 
 
@@ -70,10 +72,11 @@ def film_tables(scene: Scene, nm: np.ndarray, polarised: bool) -> FilmTables:
     first: dict[tuple[Stack | None, ...], int] = {}
     tables = [np.zeros((0, len(nm)), np.float32)]
     steps = ABOVE + 1 + BELOW * below
+    count = steps * (1 if is_alone else 12 if polarised else 3)
     for of in stacks.values():
         if of not in first:
+            tables += [stack.waves(nm) for stack in of[:1] if stack is not None and stack.film.profile]
             first[of] = 1 + sum(map(len, tables))
-            count = steps * (1 if is_alone else 12 if polarised else 3)
             none = np.zeros((count, len(nm)), np.float32)
             tables += [none if stack is None else stack.table(nm, polarised, below)[:count] for stack in of]
     rows = np.concatenate(tables)
@@ -88,7 +91,7 @@ def film_tables(scene: Scene, nm: np.ndarray, polarised: bool) -> FilmTables:
         "FILM_STEPS": steps,
         "FILM_BELOW": BELOW * below,
         "FILM_TABLES": 1 if is_alone else 3,
-        "FILM_MEDIUM_ROWS": len(tables[1]) if known else 0,
+        "FILM_MEDIUM_ROWS": count if known else 0,
         "FILM_SLOTS": f"uint[]({', '.join(f'{slot}u' for slot in known or [0])})",
     }
     return FilmTables({index: first[of] for index, of in stacks.items()}, rows, defines)
@@ -107,9 +110,25 @@ def film_curves(scene: Scene) -> list[np.ndarray]:
     colours."""
     curves = []
     for stack in dict.fromkeys(stack for of in film_stacks(scene).values() for stack in of if stack):
-        for cosine in _COSINES:
-            curves += [_blurred(curve) for curve in power(stack, cosine, VISIBLE_NM)]
+        varied = [stack.film.of_thickness(share) for share in _THICKNESSES] if stack.film.profile else [stack.film]
+        for film in varied:
+            for cosine in _COSINES:
+                curves += [_blurred(c) for c in power(Stack(stack.before, film, stack.behind), cosine, VISIBLE_NM)]
     return curves
+
+
+def film_thickness(item: SceneObject) -> tuple[np.ndarray, float, np.ndarray, float]:
+    """Where the film of an object in the world is how thick, as a share of where it is thickest: origin (3,), `bend`,
+    `slope` (3,) and `least`, such that at a place q away from the origin it is least + slope · q + bend |q|²."""
+    profile, turn, origin = item.material.film.profile, item.object_to_world[:3, :3], item.object_to_world[:3, 3]
+    thickest = max(profile.from_nm, profile.to_nm)
+    least, rise = profile.from_nm / thickest, (profile.to_nm - profile.from_nm) / thickest
+    vertices = item.mesh.vertices
+    if profile.along is None:
+        return origin, rise / max(float(((vertices @ turn.T) ** 2).sum(axis=1).max()), 1e-300), np.zeros(3), least
+    ends = vertices @ np.array(profile.along)
+    rise /= max(float(np.ptp(ends)), 1e-300)
+    return origin, 0.0, rise * np.linalg.inv(turn).T @ profile.along, least - rise * float(ends.min())
 
 
 def _blurred(curve: np.ndarray) -> np.ndarray:

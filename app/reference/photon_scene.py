@@ -194,11 +194,11 @@ def photon_scene(scene: Scene) -> tuple[PhotonScene, np.ndarray]:
         weights.array(),
         *gratings(scene),
         widths,
-        albedo_tables(widths),
+        albedo_tables(widths, np.array([item.material.is_mirror for item in scene.objects])),
         _NEAR * size,
         _CONTACT * 2.0 ** round(float(np.log2(size))),
         scene.polarised,
-        films_of(scene, TABLE_NM),
+        films_of(scene, TABLE_NM, centre),
     ), centre
 
 

@@ -64,18 +64,19 @@ def _fill(table, width, ratios, cosines, tilts, weights, turns):
             table[i, k] = max(_sent_on(width, ratios[i], cosines[k], tilts, weights, turns), 0.05)
 
 
-def albedo_tables(widths: np.ndarray) -> np.ndarray:
+def albedo_tables(widths: np.ndarray, is_mirror: np.ndarray) -> np.ndarray:
     """A table for each object's width (O,): float64 (O, ratios, NODES), shared by equal widths; ones where all are
-    polished, of which one is enough."""
+    polished, of which one is enough. A mirror (O,) is dense beyond measure, whatever the ratio."""
     if not np.any(widths > 0.0):
         return np.ones((1, len(RATIOS), NODES))
     tables = np.ones((len(widths), len(RATIOS), NODES))
     tilts, weights = np.polynomial.legendre.leggauss(80)
     cosines = np.maximum(np.linspace(0.0, 1.0, NODES) ** 2, 1e-6)
-    for width in set(widths[widths > 0.0].tolist()):
+    for width, mirror in {(w, m) for w, m in zip(widths.tolist(), is_mirror.tolist(), strict=True) if w > 0.0}:
         table = np.empty(tables.shape[1:])
-        _fill(table, width, RATIOS, cosines, 0.5 * (tilts + 1.0), 0.5 * weights, 48)
-        tables[widths == width] = table
+        ratios = np.full(1, 1e9) if mirror else RATIOS
+        _fill(table[: len(ratios)], width, ratios, cosines, 0.5 * (tilts + 1.0), 0.5 * weights, 48)
+        tables[(widths == width) & (is_mirror == mirror)] = table[:1] if mirror else table
     return tables
 
 

@@ -22,7 +22,7 @@ from .photon_scene import GRATING, MIRROR, POLARISER, SHEET
 from .polarised import amplitudes, begin_unpolarised, senkrecht, share_of, turn_fields
 from .rough_albedo import masking, sent_on
 from .sampling import mixed, word_number
-from .thin_films import film_amplitudes
+from .thin_films import film_amplitudes, film_nm
 from .vectors import across, combined, cross, dot, length, mixed_of, moved, negated, over
 
 AIR = -1
@@ -247,7 +247,7 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
     inner side, is an event, share kept, whether `draw` mattered).
 
     `draw` in [0, 1) decides by Fresnel's reflectance, unless all is reflected. "Is an event" is false where the same
-    substance is on both sides; a mirror keeps its reflectance, glass what its surface lets through, and rough glass
+    substance is on both sides; a mirror keeps its reflectance, glass what its surface lets through, and what is rough
     also the weight of a microfacet that words `event` of the hash `noise` draw (its mean is 1). In a polarised scene
     `field`, of the shape `crystals.FIELD_SHAPE`, turns with the ray.
     """
@@ -301,7 +301,7 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
         cosine = -dot(d, n)
         if cosine <= 0.0:  # seen from behind
             return d, mask, alone, not entering, True, 0.0, False
-    kept, reflects, drawn, cosine_t, eta_it = 1.0, True, False, 0.0, 1.0
+    kept, reflects, drawn, cosine_t, eta_it, share = 1.0, True, False, 0.0, 1.0, 1.0
     s, a_s, a_p = (0.0, 0.0, 0.0), complex(-1.0), complex(1.0)
     if scene.polarised:
         s = senkrecht(d, n)
@@ -311,8 +311,9 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
         if has_film:
             n_i = _refractive_index(scene, medium(scene, mask, alone), nm)
             sine = math.sqrt(max(1.0 - cosine * cosine, 0.0))
-            a_s, a_p, t_s, t_p = film_amplitudes(scene.films, thing, n_i, 1.0, n_i * sine, False, nm)
-            kept *= _film_share(scene, field, d, s, a_s, a_p)
+            a_s, a_p, t_s, t_p = film_amplitudes(scene.films, thing, n_i, 1.0, n_i * sine, False, nm, -1.0)
+            share = _film_share(scene, field, d, s, a_s, a_p)
+            kept *= share
     else:
         eta_it = _refractive_index(scene, before, nm) / _refractive_index(scene, after, nm)
         reflectance, cosine_t = fresnel(cosine, eta_it)
@@ -329,11 +330,11 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
             reflectance = 2.0 * reflectance / (1.0 + reflectance)
         if has_film:
             n_i, n_t = _refractive_index(scene, before, nm), _refractive_index(scene, after, nm)
-            sine = n_i * math.sqrt(max(1.0 - cosine * cosine, 0.0))
+            sine, own_nm = n_i * math.sqrt(max(1.0 - cosine * cosine, 0.0)), film_nm(scene.films, thing, place)
             back = not entering
             if back and not sheet:
                 n_i, n_t = n_t, n_i
-            a_s, a_p, t_s, t_p = film_amplitudes(scene.films, thing, n_i, n_t, sine, back, nm)
+            a_s, a_p, t_s, t_p = film_amplitudes(scene.films, thing, n_i, n_t, sine, back, nm, own_nm)
             reflected, passed = _film_share(scene, field, d, s, a_s, a_p), _film_share(scene, field, d, s, t_s, t_p)
             kept = reflected + passed if cosine_t > 0.0 or sheet else reflected
             reflectance = reflected / kept
@@ -360,7 +361,8 @@ def scatter(scene, triangle, place, u, v, d, mask, alone, nm, draw, noise, event
         side = 1.0 if reflects else -1.0
         leaving = side * dot(r, whole)
         kept *= cosine * masking(facing, width) * masking(leaving, width) / (facing * dot(n, whole))
-        kept /= sent_on(scene.albedo, thing, facing, eta_it)
+        # What does not leave meets other microfacets, which share it out as the first: of a metal, less and less.
+        kept /= 1.0 - share * (1.0 - sent_on(scene.albedo, thing, facing, eta_it))
         if side * dot(r, g) <= 0.0:
             kept = 0.0
     if scene.polarised and kept > 0.0:

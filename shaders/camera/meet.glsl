@@ -66,9 +66,10 @@ void leave_film_share(inout Path path, Event event, bool reflects) {
         vec3 middles = 0.5 * (ends + ends.yzz), cosine = band_weights(path.band, event.film.cosine, middles),
              q = vec3(0.0);
         if (POLARISED) q = band_weights(path.band, event.seen.q, middles);
-        weaken_films(path.walk,
-            vec2(film_between(event.film, reflects, cosine.x, q.x, ends.x, ends.y),
-                film_between(event.film, reflects, cosine.y, q.y, ends.y, ends.z)));
+        vec2 left = vec2(film_between(event.film, reflects, cosine.x, q.x, ends.x, ends.y),
+            film_between(event.film, reflects, cosine.y, q.y, ends.y, ends.z));
+        if (ROUGH_SURFACES) left = reflected_in_all(left.xyy, event.ground.thrown).xy;
+        weaken_films(path.walk, left);
         from = ends.z;
     }
 }
@@ -207,7 +208,11 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
     if (HAS_MIRROR && kind == KIND_MIRROR) {
         bool geometric;
         if (HAS_FILM && FILM_MET(event)) leave_film_share(path, event, true);
-        reflect_path(path, event, geometric);
+        vec3 unhidden = reflect_path(path, event, geometric);
+        if (ROUGH_SURFACES) {
+            send_on(path, event, HAS_FILM && FILM_MET(event) ? vec3(1.0) : event.reflectance, unhidden);
+            if (event.ground.width > 0.0) path.walk.ground = 1u;
+        }
         leave_surface(path, hit, dot(path.direction, hit.normal_g) < 0.0);
         vec3 colour = object_colours[hit.object].rgb;
         if (ABSORPTION) {

@@ -9,7 +9,7 @@ bool is_covered(sampler2D map, RayOrigin origin, vec3 position, vec3 normal, flo
     if (intersect_closest(position, normal, FAR_DISTANCE, origin, hit) && hit.object != origin.object) {
         Object over = object_at(hit.object);
         bool holds = dot(hit.normal_g, normal) > 0.0 && over.medium != NONE && over.kind < KIND_GRATING;
-        if (holds && over.receiver != NONE) holds = receiver_record(map, over.receiver).w < 2.0;
+        if (holds && over.kind == KIND_DIFFUSE) holds = receiver_record(map, over.receiver).w < 2.0;
         covered = holds || hit.distance < reach;
     }
     return covered;

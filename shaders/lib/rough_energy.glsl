@@ -16,3 +16,7 @@ vec3 regained(float table, float cosine, vec3 eta_it) {
     }
     return 1.0 / sent;
 }
+
+// What leaves a mirror in all of what one of its microfacets reflects of it, where `thrown` of that meets others, each
+// of which reflects as much again.
+vec3 reflected_in_all(vec3 reflected, float thrown) { return reflected / (1.0 - thrown * reflected); }

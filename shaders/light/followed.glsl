@@ -59,7 +59,7 @@ vec3 film_lobe(Path path, Event event, bool reflects) {
     float q = 0.0;
     if (POLARISED) q = event.seen.q.y;
     for (int c = 0; c < 3; ++c) found[c] = film_between(event.film, reflects, event.film.cosine.y, q, low[c], high[c]);
-    return found;
+    return ROUGH_SURFACES ? reflected_in_all(found, event.ground.thrown) : found;
 }
 
 // What glass reflects and lets through at all wavelengths that a path represents.
@@ -144,7 +144,10 @@ FollowedRay follow_specular(
             Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, number, hash_combine(key, 0x100u)));
             bool passes = false, changes = true, geometric;
             vec3 unhidden = vec3(1.0);
-            if (HAS_MIRROR && kind == KIND_MIRROR) tint_by(path.walk, uint(WEIGHT_ROW) + thing.weight_row, -1.0);
+            if (HAS_MIRROR && kind == KIND_MIRROR) {
+                tint_by(path.walk, uint(WEIGHT_ROW) + thing.weight_row, -1.0);
+                if (ROUGH_SURFACES && !(HAS_FILM && FILM_MET(event))) unhidden = event.reflectance;
+            }
             if (HAS_FILM && HAS_MIRROR && kind == KIND_MIRROR && FILM_MET(event)) {
                 for (int t = 0; t < TINTS; ++t)
                     path.walk.tint[t] *= GATHERED_SPECTRUM ? event_for(path, event, kind, path.walk.x[t]).reflectance
@@ -182,7 +185,7 @@ FollowedRay follow_specular(
                         tint_by(path.walk, uint(WEIGHT_ROW) + thing.texture, -1.0);
                 }
             }
-            if (!passes && !parts_waves) unhidden = reflect_path(path, event, geometric);
+            if (!passes && !parts_waves) unhidden *= reflect_path(path, event, geometric);
             for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= unhidden.y;
             leave_surface(path, hit, passes ? entering : !entering);
             lost = float(number + 1u == uint(MAX_EVENTS));

@@ -258,7 +258,7 @@ uint arrive(uint slot, out Arrival at, out Outcome outcome) {
     if (LOBE_COLUMNS && met && p.bounded != 0u) keep_pair_above(path, LOBE, hit.normal_g);
     transfer_columns(path, hit.normal_g, hit.distance);
     if (FOOTPRINTS && (IS_GLASS(kind) || kind == KIND_MIRROR))
-        keep_columns_within(path, start, thing.kind == KIND_MIRROR ? thing.colour.w : thing.colour.z, hit.distance);
+        keep_columns_within(path, start, thing.colour.z, hit.distance);
 
     at = Arrival(path, start, hit, facet, thing, kind, border);
     if (BEAMS && met && (path.walk.light_and_source >> 16) == 0xffffu && is_beam_object(hit.object)) {

@@ -13,6 +13,9 @@ MicrofacetDraw microfacet_draw(Path path) {
         hash_combine(p.lattice_bits != 0u ? p.surface_key : path.walk.branch_key, sub));
 }
 
+// Whether a surface keeps what no lobe of it has in the end.
+bool keeps_light(Event event) { return (ROUGH_SURFACES && event.ground.width > 0.0) || (HAS_FILM && FILM_MET(event)); }
+
 // Leaves a path that has been turned its share of the power, over its band, and what microfacets do not hide of it;
 // `share`: of the power, by which roulette judges. A microfacet's shadow is no fall-back.
 void send_on(inout Path child, Event event, vec3 share_over_band, vec3 companions, vec3 unhidden, bool geometric,
@@ -78,6 +81,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
         send_on(child, event, kept, of_companions, unhidden, geometric, share, outcome);
         polarise_companions(child, companions, false);
         outcome.flux_w = carried_w(path) - carried_w(child);
+        if (keeps_light(event)) outcome.absorbed_w += carried_w(child);  // `send_on` has counted it, too
         lives = survives(child, outcome.roulette_w, share, 3u);
     }
     if (HAS_POLARISER && kind == KIND_POLARISER) {
@@ -123,8 +127,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     if (BAND_CUTS && HAS_DIELECTRIC && parts) part = passing_part(path, event, onset);
     if (HAS_DIELECTRIC && splits) {
         // What neither of both parts has in the end, the surface keeps.
-        if ((ROUGH_SURFACES && event.ground.width > 0.0) || (HAS_FILM && FILM_MET(event)))
-            outcome.absorbed_w += carried_w(path);
+        if (keeps_light(event)) outcome.absorbed_w += carried_w(path);
         float share = reflected_share;
         send_on(child, event, event.reflectance, companions.reflectance, unhidden, geometric, share, outcome);
         polarise_companions(child, companions, false);

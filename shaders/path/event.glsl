@@ -83,7 +83,7 @@ Event event_at(Path path, Hit hit, Triangle facet) {
         for (int c = 0; c < PATH_COLUMNS; ++c) event.normal_columns[c] = normal_column(event.frame, path.dposition[c]);
     }
     if (ROUGH_SURFACES) {
-        event.ground.width = event.ground.table = 0.0;
+        event.ground.width = event.ground.table = event.ground.thrown = 0.0;
         event.ground.normal = event.frame.normal;
         event.ground.regained = vec3(1.0);
         if (SPECTRAL_SWEEP) event.ground.end_normal = event.end_normal;
@@ -94,9 +94,12 @@ Event event_at(Path path, Hit hit, Triangle facet) {
 // A ground surface: the microfacet that the path meets takes the place of the normals, and turns with them.
 void meet_microfacet(Path path, Object thing, MicrofacetDraw draw, inout Event event) {
     event.ground.width = thing.colour.x;
-    event.ground.table = thing.colour.y;
+    event.ground.table = thing.colour.w;
     if (event.ground.width <= 0.0) return;
     vec3 normal = event.frame.normal;
+    if (HAS_MIRROR && thing.kind == KIND_MIRROR)
+        event.ground.thrown =
+            1.0 - spectral_row(uint(ROUGH_ROW) + uint(event.ground.table), -dot(path.direction, normal));
     vec3 microfacet = visible_microfacet(
         -path.direction, normal, event.ground.width, microfacet_numbers(draw.number, draw.depth, draw.key));
     if (NORMAL_DERIVATIVES) {
@@ -137,15 +140,23 @@ const uint film_slots[] = FILM_SLOTS;
 // The film that light meets, if any, as it is in the medium outside of it. `boundary`: of glass.
 Film film_met(Path path, Hit hit, Object thing, MediumInterface boundary) {
     bool glass = HAS_DIELECTRIC && IS_GLASS(thing.kind), back = glass && dot(path.direction, hit.normal_g) > 0.0;
-    bool ground = ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC && thing.colour.x > 0.0;
-    uint row = ground ? 0u : uint(thing.colour.y);
+    uint row = uint(thing.colour.y);
     if (FILM_MEDIUM_ROWS > 0 && row != 0u) {
         uint outside = back && !IS_THIN(boundary) ? boundary.after
             : glass                               ? boundary.before
                                                   : current_medium(path.medium);
         if (outside != NONE) row += uint(FILM_MEDIUM_ROWS) * film_slots[object_at(outside).medium];
     }
-    return Film(row, back ? FILM_BACK : FILM_FRONT, vec3(1.0));
+    Film film;
+    film.row = row;
+    film.back = back ? FILM_BACK : FILM_FRONT;
+    film.cosine = vec3(1.0);
+    if (FILM_VARIES) film.thickness = -1.0;
+    if (FILM_VARIES && thing.colour.x < 0.0) {
+        film.thickness = film_share_of_thickest(uint(-1.0 - thing.colour.x), path.position);
+        film.waves = uint(FILM_ROW) + uint(thing.colour.y) - 2u;
+    }
+    return film;
 }
 
 // What a surface makes of light at three wavelengths `x` that meets it at the cosines event.theta, in the state
@@ -187,6 +198,7 @@ void share_at(vec3 x, bool single, uint kind, inout Event event) {
             event.transmittance =
                 FILM_TABLES == 1 ? 1.0 - event.reflectance : film_share(event.film, FILM_PASSED, x, single);
         }
+        if (ROUGH_SURFACES) event.reflectance = reflected_in_all(event.reflectance, event.ground.thrown);
     }
     if (HAS_DIELECTRIC && IS_GLASS(kind)) {
         GO_STRAIGHT(event.boundary, event.theta, event.n_i, event.n_t, event.cosine2)
@@ -240,7 +252,8 @@ bool parts_wavelengths(Event event) { return event.n_i.x * event.n_t.z != event.
 // ground surface it meets.
 Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {
     Event event = event_at(path, hit, facet);
-    if (ROUGH_SURFACES && thing.kind == KIND_DIELECTRIC) meet_microfacet(path, thing, draw, event);
+    if (ROUGH_SURFACES && (thing.kind == KIND_DIELECTRIC || thing.kind == KIND_MIRROR))
+        meet_microfacet(path, thing, draw, event);
     if (HAS_DIELECTRIC && IS_GLASS(thing.kind))
         event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
     if (HAS_FILM) event.film = film_met(path, hit, thing, event.boundary);
@@ -251,7 +264,8 @@ Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw 
         if (HAS_FILM && FILM_MET(event)) {
             event.theta = incidence_over_band(path, event);
             share_at(path.band, false, thing.kind, event);
-        }
+        } else if (ROUGH_SURFACES)
+            event.reflectance = reflected_in_all(vec3(1.0), event.ground.thrown);
     }
     return event;
 }

@@ -1,5 +1,6 @@
-// A ground surface: a path meets one of its microfacets, the same at all wavelengths of its band (which all meet it as
-// probably as the anchor does), and goes on as from a polished surface that is turned as this one is.
+// A ground surface of glass or metal: a path meets one of its microfacets, the same at all wavelengths of its band
+// (which all meet it as probably as the anchor does), and goes on as from a polished surface that is turned as this one
+// is.
 
 // Which microfacet a path meets: number `number` of the sequence of this key, at this depth. Parts of a band that was
 // cut here meet the surface again, and find the same one.
@@ -21,6 +22,7 @@ struct Ground {
     float width;  // GGX's; 0: it is polished
     float table;  // of what it sends on
     vec3 normal;  // the surface's own, against the path
-    vec3 regained;  // factor for what its microfacets send on after all, over the band
+    float thrown;  // of a mirror: share of what its microfacets reflect that they throw at each other
+    vec3 regained;  // of glass: factor for what its microfacets send on after all, over the band
     vec3 end_normal[2];  // where the band's ends arrive
 };

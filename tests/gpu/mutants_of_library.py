@@ -111,6 +111,18 @@ OF_LIBRARY = {
         "kronecker(i, along, own)",
         "statistical/test_rough_glass.py::test_one_surface_reflects_what_its_microfacets_do",
     ),
+    "light between the microfacets of a metal is lost": Mutant(
+        "lib/rough_energy.glsl",
+        "reflected / (1.0 - thrown * reflected)",
+        "reflected",
+        "gpu/test_rough_metal.py::test_a_rough_mirror_in_a_furnace",
+    ),
+    "a film that varies by the distance, not its square": Mutant(
+        "lib/film.glsl",
+        "wedge.bend * dot(way, way)",
+        "sqrt(wedge.bend) * length(way)",
+        "gpu/test_varied_films.py::test_newtons_rings_seen",
+    ),
     "glass that is never left": Mutant(
         "lib/medium.glsl",
         "boundary.behind = MediumStack(stack.mask, entering ? object : NONE);",

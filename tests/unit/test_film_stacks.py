@@ -7,20 +7,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.model.film_stacks import film_curves, film_stacks, film_tables
+from spectrasplat.model.film_stacks import film_curves, film_stacks, film_tables, film_thickness
 from spectrasplat.model.geometry.primitives import box, plane
 from spectrasplat.model.io.scene_table import SceneTable
-from spectrasplat.model.materials.coating import PRESETS, Coating
+from spectrasplat.model.materials.coating import PRESETS, RADIUS, Coating
 from spectrasplat.model.materials.material_file import read_material
+from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.metals import metals
 from spectrasplat.model.optics.thin_films import AIR, Film, Layer, Stack, power
 from spectrasplat.model.scene import Camera, Dielectric, Material, Mirror, Scene, SceneObject
-from spectrasplat.reference.thin_films import film_amplitudes, films_of
+from spectrasplat.reference.thin_films import film_amplitudes, film_nm, films_of
+from spectrasplat.render.viewer.invalidation import DirtyLevel, _object
 
 NM = np.linspace(380.0, 780.0, 41)
 GLASS = constant(1.52)
 GRID = np.linspace(380.0, 780.0, 8001)
+SHEET = plane(1.0, 1.0)
 
 
 def stack(*layers: tuple[float, float]) -> Stack:
@@ -115,7 +118,7 @@ def test_the_reference_has_the_same_by_another_way() -> None:
             nm, sine, back = GRID[rng.integers(1, 8000)], rng.uniform(0.0, 1.0), bool(rng.integers(2))
             sine *= 1.5 if back else 1.0  # beyond total reflection, from behind
             wanted = Stack(AIR, film, GLASS).amplitudes(np.array([sine]), np.array([nm]), back)
-            found = film_amplitudes(tables, 0, 1.0, 1.52, sine, back, nm)
+            found = film_amplitudes(tables, 0, 1.0, 1.52, sine, back, nm, -1.0)
             np.testing.assert_allclose([a[0] for a in wanted], found, atol=1e-8)
 
 
@@ -172,7 +175,9 @@ LAYERS = [{"n": 1.38, "nm": 99.6}, {"metal": "silver", "nm": 20.0}, {"glass": "S
         {"glass": "water", "film_nm": 300.0, "film_index": 1.47},
         {"glass": "Schott N-BK7", "film_nm": 300.0, "coating": "ar"},
         {"kind": "mirror", "metal": "gold", "film_nm": 80.0, "film_index": 2.0},
-        {"kind": "mirror", "metal": "copper"},
+        {"kind": "mirror", "metal": "copper", "roughness": 0.4},
+        {"glass": "water", "thin": True, "film_nm": 900.0, "film_from_nm": 20.0, "film_along": [0.0, -1.0, 0.0]},
+        {"n_d": 1.0, "thin": True, "film_nm": 3000.0, "film_along": "radius"},
     ],
 )
 def test_words_come_back(text: dict[str, object], tmp_path: Path) -> None:
@@ -197,12 +202,57 @@ def test_words_come_back(text: dict[str, object], tmp_path: Path) -> None:
         ({"glass": "N-BK7", "film_nm": 2e5}, "film_nm"),
         ({"kind": "mirror", "metal": "tin"}, "metal: 'tin' is no metal that is known"),
         ({"kind": "mirror", "coating": "ar"}, "coating has no effect on an ideal mirror"),
+        ({"kind": "mirror", "metal": "gold", "film_along": "radius"}, "film_along"),
+        ({"glass": "water", "film_nm": 9.0, "film_from_nm": 3.0}, "film_from_nm has no effect on an even film: give"),
+        ({"glass": "water", "film_nm": 9.0, "film_along": "up"}, "film_along"),
     ],
 )
 def test_what_cannot_be_is_refused(text: dict[str, object], message: str, tmp_path: Path) -> None:
     with pytest.raises(UserError, match=message) as caught:
         read(text, tmp_path)
     assert "scene.toml" in str(caught.value)
+
+
+@pytest.mark.parametrize("more", [{"coating": Coating(PRESETS["ar"])}, {"film_from_nm": 3e4}])
+def test_a_film_that_varies_is_the_only_one_and_thin(more: dict[str, object]) -> None:
+    with pytest.raises(UserError, match=r"scene.toml: object 'oil' has a film whose thickness varies.*make it thinner"):
+        Dielectric(GLASS, film_nm=400.0, film_along=RADIUS, **more).check_on(plane(1.0, 1.0), "oil", "scene.toml")
+
+
+@pytest.mark.parametrize("along", [RADIUS, (0.6, 0.8, 0.0)])
+def test_thickness_by_place(along: tuple[float, float, float]) -> None:
+    """Of a sheet that is stretched and turned: its corners and its middle, as the reference has them too."""
+    turn = np.array([[0.0, -2.0, 0.0, 3.0], [1.5, 0.0, 0.0, 4.0], [0.0, 0.0, 1.0, 5.0], [0.0, 0.0, 0.0, 1.0]])
+    film = Dielectric(GLASS, thin=True, film_nm=100.0, film_from_nm=500.0, film_along=along)
+    item = SceneObject("film", plane(2.0, 2.0), film, turn)
+    places = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]])
+    expected = [500.0, 100.0, 100.0, 100.0] if along == RADIUS else [300.0, 100.0, 500.0, 300.0 + 400.0 / 14.0]
+    origin, bend, slope, least = film_thickness(item)
+    tables = films_of(Scene("one", Camera((0, 0, 1), (0, 0, 0)), (), (item,)), GRID)
+    for place, nm in zip(places @ turn[:3, :3].T + turn[:3, 3], expected, strict=True):
+        way = place - origin
+        assert 500.0 * (least + slope @ way + bend * way @ way) == pytest.approx(nm)
+        assert film_nm(tables, 0, tuple(place)) == pytest.approx(nm)
+
+
+def test_one_table_holds_every_thickness() -> None:
+    """Means over a band, from the table of a film that varies, against the film of that thickness."""
+    water = find("water")
+    film = Dielectric(water, thin=True, film_nm=900.0, film_along=RADIUS).film
+    assert film is not None
+    stack, nm = Stack(AIR, film, AIR), np.linspace(780.0, 380.0, 1025)
+    row, waves = stack.table(nm, False, False)[128], stack.waves(nm)[0]
+    for share in (0.05, 0.4, 1.0):
+        low, high = (share * np.interp(x, np.linspace(0.0, 1.0, 1025), waves) for x in (0.5, 0.52))
+        at = np.linspace(0.0, 1.0, 1025)
+        found = (np.interp(high, at, row) - np.interp(low, at, row)) / (high - low)
+        exact, _ = power(Stack(AIR, film.of_thickness(share), AIR), 1.0, np.linspace(580.0, 572.0, 51))
+        assert found == pytest.approx(exact.mean(), abs=3e-4)
+
+
+def test_the_viewer_follows_a_film() -> None:
+    bare, oiled, more = (SceneObject("oil", SHEET, Dielectric(GLASS, film_nm=nm)) for nm in (0.0, 300.0, 310.0))
+    assert min(_object(bare, oiled), _object(oiled, more)) == DirtyLevel.BUILD
 
 
 def test_rough_glass_has_no_film() -> None:

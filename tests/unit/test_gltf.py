@@ -161,8 +161,9 @@ MATERIALS: dict[str, tuple[dict[str, Any], Any]] = {
     "sheen": ({"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.5}}, Diffuse((1.0, 1.0, 1.0))),
     "mirror": (
         {"pbrMetallicRoughness": {"baseColorFactor": [0.9, 0.8, 0.7, 1], "roughnessFactor": 0.05}},
-        Mirror((0.9, 0.8, 0.7)),
+        Mirror((0.9, 0.8, 0.7), roughness=0.05),
     ),
+    "brushed": ({"pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0.5}}, Mirror(roughness=0.5)),
     "named": ({"extras": {"spectrasplat": {"glass": "n-sf11"}}}, Dielectric(catalogue.find("N-SF11"))),
     "short": ({"extras": {"glass": "Schott N-BK7"}}, Dielectric(catalogue.find("N-BK7"))),
     "named wins": (glass_material() | {"extras": {"glass": "F2"}}, Dielectric(catalogue.find("F2"))),

@@ -114,13 +114,14 @@ def _material(values: dict[str, Any], name: str, where: str, unshown: Unshown) -
         return _glass(values, name, where, vec3(1.0 - alpha * (1.0 - c) for c in rgb), unshown).changed(thin=True)
     elif blends and (alpha < 1.0 or _BASE_COLOUR in pbr):
         unshown.add("Alpha-blended materials are shown opaque", name)
-    if is_metal and roughness <= _MIRROR_ROUGHNESS:
-        return Mirror(vec3(rgb))
+    # A file that says nothing has metal of roughness 1 by glTF's defaults.
+    if is_metal and _BASE_COLOUR not in pbr and ("metallicFactor" in pbr or roughness <= _MIRROR_ROUGHNESS):
+        return Mirror(vec3(rgb), roughness=min(max(roughness, 0.0), 1.0))
     if roughness < _COAT_ROUGHNESS and not is_metal:
         ior = float(extensions.get(IOR, {}).get("ior", USUAL_COAT_INDEX))
         return Diffuse(vec3(rgb), roughness=max(roughness, 0.0), coat_index=min(max(ior, 1.0), 4.0))
     if "metallicFactor" in pbr and is_metal:
-        unshown.add("Rough metals are shown as diffuse surfaces of their colour", name)
+        unshown.add("Metals with a picture are shown as diffuse surfaces", name)
     return Diffuse(vec3(rgb))
 
 
@@ -233,7 +234,7 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
         extensions |= _glass_extensions(material, 0.0 if material.thin else thickness)
         roughness, rgb = material.roughness, material.transmittance_rgb
     elif material.is_mirror:
-        rgb, metallic = material.reflectance_rgb, 1.0
+        rgb, metallic, roughness = material.reflectance_rgb, 1.0, material.roughness
     elif not material.is_specular:
         rgb, roughness = (0.0, 0.0, 0.0) if material.is_black else material.reflectance_rgb, 1.0
         if material.has_coat:
@@ -244,7 +245,7 @@ def write_gltf_material(values: dict[str, Any], material: Material, thickness: f
     pbr |= {"baseColorFactor": [*map(float, rgb), 1.0], "metallicFactor": metallic, "roughnessFactor": roughness}
     if material.receives:
         _wear(pbr, texture)
-    exact = not (material.is_mirror or material.receives) or material.reflectance is not None
+    exact = not (material.is_mirror or material.receives) or material.reflectance is not None or bool(material.metal)
     if exact:
         own["material"] = material.values()
     if own:

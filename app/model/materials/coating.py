@@ -8,10 +8,10 @@ from typing import Any
 
 from ...base.errors import suggestion
 from ..fields import Animated, Number, Part, Row
-from ..io.scene_table import SceneTable
+from ..io.scene_table import REQUIRED, SceneTable
 from ..optics.glass import Dispersion, constant
 from ..optics.metals import Metal, find_metal
-from ..optics.thin_films import MAX_LAYERS, MAX_NM, Film, Layer
+from ..optics.thin_films import MAX_LAYERS, MAX_NM, Film, Layer, Profile
 from .dispersion_file import describe_dispersion, named_glass
 
 FILM_NM = Number(
@@ -34,6 +34,47 @@ FILM_NM = Number(
     animated=Animated("Thickness of the film on a surface of glass, nm", 0.0, MAX_NM),
 )
 FILM_INDEX = Number("film_index", 1.33, optional=True, at_least=1.0, at_most=5.0)
+FILM_FROM_NM = Number(
+    "film_from_nm",
+    0.0,
+    unit="nm",
+    optional=True,
+    at_least=0.0,
+    at_most=MAX_NM,
+    row=Row(
+        "Film begins",
+        "Thickness where a film that varies begins; it ends with that of the film.",
+        0.0,
+        2000.0,
+        0.0,
+        "%.0f nm",
+        is_slider=True,
+    ),
+    animated=Animated("Thickness of a film that varies, where it begins, nm", 0.0, MAX_NM),
+)
+RADIUS = (0.0, 0.0, 0.0)
+
+
+class FilmAlong(Part):
+    """`film_along`: a direction; or "radius", which is `RADIUS`."""
+
+    def read(self, table: SceneTable) -> dict[str, Any]:
+        """None: the film is even."""
+        if not table.has("film_along"):
+            if table.has("film_from_nm"):
+                table.fail(
+                    "film_from_nm", "has no effect on an even film: give 'film_along', a direction or \"radius\""
+                )
+            return {"film_along": None}
+        if not isinstance(table.raw("film_along"), str):
+            return {"film_along": table.unit_vector("film_along", REQUIRED)}
+        table.choice("film_along", ("radius",))
+        return {"film_along": RADIUS}
+
+    def write(self, value: Any, path: Path | None) -> dict[str, Any]:
+        """As it was given."""
+        along = value.film_along
+        return {} if along is None else {"film_along": "radius" if along == RADIUS else list(along)}
 
 
 @dataclass(frozen=True)
@@ -137,17 +178,26 @@ def _layer_words(layer: Layer) -> dict[str, Any]:
 def film_of(value: Any, liquid: Dispersion | None = None) -> Film | None:
     """The film that a material's keys say it has; `liquid`: of a sheet that is itself the film."""
     coating: Coating | None = value.coating
-    if coating is None and value.film_nm == 0.0:
+    along, thickest = value.film_along, value.film_nm
+    profile = None
+    if along is not None:
+        thickest = max(thickest, value.film_from_nm)
+        profile = Profile(value.film_from_nm, value.film_nm, None if along == RADIUS else along)
+    if coating is None and thickest == 0.0:
         return None
     if coating is None and liquid is not None:
-        return Film((Layer(liquid, value.film_nm),), alone=True)
-    above = (Layer(constant(value.film_index), value.film_nm),) if value.film_nm else ()
+        return Film((Layer(liquid, thickest),), alone=True, profile=profile)
+    above = (Layer(constant(value.film_index), thickest),) if thickest else ()
+    if profile is not None:
+        return Film(above, profile=profile)
     return Film(above) if coating is None else Film((*above, *coating.film.layers), coating.film.share)
 
 
 def film_words(value: Any) -> str:
     """What a material's keys say of films, for reports."""
     words = f", a film of {value.film_nm:g} nm" if value.film_nm else ""
+    if value.film_along is not None:
+        words = f", a film of {value.film_from_nm:g} to {value.film_nm:g} nm"
     if value.coating is None:
         return words
     film = value.coating.film

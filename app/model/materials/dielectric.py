@@ -12,11 +12,11 @@ from ..io.scene_table import SceneTable
 from ..optics import catalogue, crystals, glass
 from ..optics.colorimetry import VISIBLE_NM
 from ..optics.glass import Dispersion
-from ..optics.thin_films import Film
+from ..optics.thin_films import MAX_VARIED_NM, Film
 from ..optics.tints import tint_of
 from ..vectors import Vec3
 from .absorption import Absorption, AbsorptionPart
-from .coating import FILM_INDEX, FILM_NM, Coating, CoatingPart, film_of, film_words
+from .coating import FILM_FROM_NM, FILM_INDEX, FILM_NM, Coating, CoatingPart, FilmAlong, film_of, film_words
 from .dispersion_file import DispersionPart
 from .material import Material, colour_words
 
@@ -34,14 +34,14 @@ ROUGHNESS = Number(
     at_most=1.0,
     row=Row(
         "Roughness",
-        "How rough all of its surface is ground: 0 polished, 0.3 frosted, 1 as matt as may be.",
+        "How rough all of its surface is: 0 polished, 0.3 frosted or brushed, 1 as matt as may be.",
         0.0,
         1.0,
         0.0,
         "%.3f",
         is_slider=True,
     ),
-    animated=Animated("Roughness of a glass's surface; 0 is polished", 0.0, 1.0),
+    animated=Animated("Roughness of the surface of glass or a mirror; 0 is polished", 0.0, 1.0),
 )
 THIN = Flag(
     "thin",
@@ -86,6 +86,9 @@ class Dielectric(Material):
     coating: Coating | None = None
     film_nm: float = 0.0
     film_index: float = 1.33
+    film_along: Vec3 | None = None
+    """Direction, in the object's own coordinates, in which the film's thickness rises to `film_nm` from …"""
+    film_from_nm: float = 0.0
     extraordinary: Dispersion | None = None
     """Of a uniaxial crystal, whose `dispersion` is the ordinary one; None: it is isotropic."""
     axis: Vec3 = Z_AXIS
@@ -104,6 +107,8 @@ class Dielectric(Material):
         CoatingPart(),
         FILM_NM,
         FILM_INDEX,
+        FILM_FROM_NM,
+        FilmAlong(),
         _Axis("axis", Z_AXIS, optional=True),
     )
     is_specular: ClassVar = True
@@ -144,16 +149,22 @@ class Dielectric(Material):
         return self.changed(dispersion=ordinary, extraordinary=other)
 
     def shown_numbers(self) -> tuple[Number, ...]:
-        """Those of films and of rough surfaces are no crystal's."""
-        return () if self.is_crystal else super().shown_numbers()
+        """Those of films and of rough surfaces are no crystal's; where it begins, only one has that varies."""
+        hidden = () if self.film_along is not None else (FILM_FROM_NM,)
+        return () if self.is_crystal else tuple(number for number in super().shown_numbers() if number not in hidden)
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
-        """Crystals are solid, polished and bare."""
+        """Crystals are solid, polished and bare; a film whose thickness varies is the only one and not too thick."""
+        if self.film_along is not None and (self.coating or max(self.film_nm, self.film_from_nm) > MAX_VARIED_NM):
+            raise UserError(
+                f"{file_name}: object '{name}' has a film whose thickness varies ('film_along'), which may be up to "
+                f"{MAX_VARIED_NM:,.0f} nm thick and have no 'coating' under it; make it thinner, or leave 'coating' out"
+            )
         faults = {
             "thin": self.thin,
             "roughness": self.roughness > 0.0,
             "coating": self.coating is not None,
-            "film_nm": self.film_nm > 0.0,
+            "film_nm": self.film_nm > 0.0 or self.film_along is not None,
         }
         key = next((key for key, holds in faults.items() if holds), None)
         if self.is_crystal and key is not None:

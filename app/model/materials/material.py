@@ -53,11 +53,13 @@ class Material:
     """The thin film on it, `optics.thin_films.Film`."""
     coating = cast(Any, None)
     film_nm = 0.0
+    film_along = cast(Any, None)
+    """Direction that a film's thickness varies in; None: it is even."""
     metal = ""
     texture = cast(Any, None)
     absorption = cast(Any, None)
     roughness = cast(Any, None)
-    """Roughness of the coat of a diffuse surface (None: no coat) or of a dielectric's surface (0: polished)."""
+    """Roughness of the coat of a diffuse surface (None: no coat) or of glass or a mirror (0: polished)."""
     coat_index = 1.0
     diffuse_roughness = 0.0
     dispersion = cast(Any, None)
@@ -124,8 +126,8 @@ class Material:
 
     @property
     def is_rough(self) -> bool:
-        """It is a solid with a rough surface (ground glass), which scatters paths at random."""
-        return self.is_solid and self.roughness > 0.0
+        """It is a solid or a mirror with a rough surface, which scatters paths at random."""
+        return (self.is_solid or self.is_mirror) and self.roughness > 0.0
 
     @property
     def microfacet_width(self) -> float:

@@ -12,10 +12,10 @@ from .material import Material
 
 _OF_GLASS = {
     PRIORITY: "decides between overlapping solids of glass",
-    ROUGHNESS: "is for the surface of glass",
+    ROUGHNESS: "is for the surface of glass or of a mirror",
     THIN: "is for a sheet of glass",
 }
-"""Keys that an object may give its glass, and what they are for."""
+"""Keys that an object may give its glass or its mirror, and what they are for."""
 
 
 def read_materials(table: SceneTable, textures: TextureReader | None = None) -> dict[str, Material]:
@@ -55,7 +55,7 @@ def read_object_material(
         material = material.with_gain(table.number(GAIN, at_least=0.0), table.where(GAIN))
     for field, what in _OF_GLASS.items():
         if table.has(field.attribute):
-            if not material.transmits:
+            if field not in material.parts:
                 table.fail(field.attribute, f"{what}; this object has none")
             material = material.changed(**field.read(table))
     return material

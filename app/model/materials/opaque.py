@@ -1,4 +1,4 @@
-"""What light does not enter: a perfect mirror, and a perfect absorber."""
+"""What light does not enter: a mirror, polished or rough, and a perfect absorber."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from ..optics.thin_films import Film
 from ..texture import TextureReader
 from ..vectors import Vec3
 from .coating import FILM_INDEX, FILM_NM, Coating, CoatingPart, film_of, film_words
+from .dielectric import ROUGHNESS
 from .material import Material, colour_words
 
 
@@ -32,13 +33,14 @@ class MetalPart(Part):
 
 @dataclass(frozen=True)
 class Mirror(Material):
-    """A specular reflector: ideal, with linear Rec.709 reflectance; or of polished metal, times that."""
+    """A specular reflector: ideal, with linear Rec.709 reflectance; or of metal, times that."""
 
     reflectance_rgb: Vec3 = (1.0, 1.0, 1.0)
     metal: str = ""
     coating: Coating | None = None
     film_nm: float = 0.0
     film_index: float = 1.33
+    roughness: float = 0.0
 
     kind: ClassVar = "mirror"
     title: ClassVar = "Mirror"
@@ -49,6 +51,7 @@ class Mirror(Material):
         CoatingPart(),
         FILM_NM,
         FILM_INDEX,
+        ROUGHNESS,
     )
     is_specular: ClassVar = True
     is_mirror: ClassVar = True
@@ -70,19 +73,20 @@ class Mirror(Material):
     @property
     def why_no_beams(self) -> str | None:  # type: ignore[override]
         """Beams know a mirror's colour, whatever the angle."""
-        return "it is of metal" if self.metal else None
+        return "it is of metal" if self.metal else "its surface is rough" if self.is_rough else None
 
     def shown_numbers(self) -> tuple[Number, ...]:
         """Those of a film have no effect on an ideal mirror."""
-        return super().shown_numbers() if self.metal else ()
+        return super().shown_numbers() if self.metal else (ROUGHNESS,)
 
     def content(self) -> tuple[object, ...]:
-        """With its metal and what lies on it."""
-        return super().content() + (() if self.film is None else (self.metal, self.film))
+        """With its roughness, its metal and what lies on it."""
+        return *super().content(), self.roughness, self.metal, *(() if self.film is None else (self.film,))
 
     def words(self) -> str:
         """With its metal and its colour."""
-        return f"mirror {self.metal or colour_words(self.reflectance_rgb)}{film_words(self)}"
+        rough = f", roughness {self.roughness:g}" if self.is_rough else ""
+        return f"mirror {self.metal or colour_words(self.reflectance_rgb)}{film_words(self)}{rough}"
 
 
 @dataclass(frozen=True)

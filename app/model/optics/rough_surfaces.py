@@ -1,4 +1,4 @@
-"""How much light rough surfaces send on in all: a glossy coat, and ground glass.
+"""How much light rough surfaces send on in all: a glossy coat, ground glass, rough metal.
 
 A coat's lobe is single scattering by microfacets of the GGX distribution with height-correlated shadowing and masking
 [Walter et al. 2007; Heitz 2014] and Fresnel's reflectance. Its base gets what the lobe leaves on the way in and lets it
@@ -7,7 +7,8 @@ base that absorbs nothing all light comes back, from every direction. What singl
 part of what the base gets, so that nothing is lost.
 
 Ground glass has the same microfacets: `glass_sent_on` is what is left where light between microfacets is ignored, and
-paths are divided by it so that it is not lost [Turquin 2019].
+paths are divided by it so that it is not lost [Turquin 2019]. A mirror's microfacets reflect again what they throw at
+each other: where each reflects the share r, and E leaves after one of them where r is 1, r / (1 − r (1 − E)) leaves.
 """
 
 from __future__ import annotations
@@ -23,7 +24,11 @@ GLASS_INDEX_STEPS = 20
 """Rows of a table on either side of the one where both media are alike …"""
 _INDEX_REACH = float(np.log(2.8))
 """… and how far they reach, as the logarithm of the ratio of indices."""
-GLASS_ROWS = 2 * GLASS_INDEX_STEPS + 1
+MIRROR_ROW = 2 * GLASS_INDEX_STEPS + 1
+"""The row that follows them: of a mirror that loses nothing."""
+_OF_MIRROR = 1e9
+"""Its ratio of indices: all is reflected totally."""
+_ROWS = MIRROR_ROW + 1
 """Rows of the table of one width."""
 _LEAST = 0.05
 """Bound of `glass_sent_on`: media that are almost alike, met at grazing incidence, would make much of little."""
@@ -135,10 +140,15 @@ def distinct_widths(widths: Iterable[float]) -> list[float]:
 
 
 def glass_tables(widths: Iterable[float], samples: int) -> np.ndarray:
-    """Tables of `distinct_widths`, one after the other, float64 (count · GLASS_ROWS, samples)."""
+    """Tables of `distinct_widths`, one after the other, float64 (rows, samples)."""
     return np.concatenate(
         [np.zeros((0, samples)), *(_glass_table(width, samples) for width in distinct_widths(widths))]
     )
+
+
+def first_row_of(width: float, widths: list[float], is_mirror: bool) -> int:
+    """Where the table of one of the `distinct_widths` begins; a mirror's one row."""
+    return _ROWS * widths.index(width) + MIRROR_ROW * is_mirror
 
 
 def glass_defines(first_row: int) -> dict[str, int | str]:
@@ -148,9 +158,9 @@ def glass_defines(first_row: int) -> dict[str, int | str]:
 
 @lru_cache(maxsize=16)
 def _glass_table(alpha: float, samples: int) -> np.ndarray:
-    """`glass_sent_on` at `samples` cosines from 0 to 1, float64 (GLASS_ROWS, samples); the ratio of indices rises row
-    by row."""
+    """`glass_sent_on` at `samples` cosines from 0 to 1, float64 (_ROWS, samples): the ratio of indices rises; last,
+    a mirror's."""
     nodes = np.linspace(0.0, 1.0, _GLASS_NODES) ** 2  # densest where light grazes
-    ratios = np.exp(np.linspace(-_INDEX_REACH, _INDEX_REACH, GLASS_ROWS))
+    ratios = *np.exp(np.linspace(-_INDEX_REACH, _INDEX_REACH, MIRROR_ROW)), _OF_MIRROR
     at, cosine = np.maximum(nodes, 1e-6), np.linspace(0.0, 1.0, samples)
     return np.stack([np.interp(cosine, nodes, glass_sent_on(alpha, ratio, at)) for ratio in ratios])

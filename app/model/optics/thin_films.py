@@ -14,12 +14,18 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from .glass import Dispersion
+from ..vectors import Vec3
+from .glass import Dispersion, constant
 
 MAX_LAYERS = 1000
 MAX_NM = 100_000.0
+MAX_VARIED_NM = 20_000.0
+"""Of a film whose thickness varies: one table holds all of its interference, which is finer the thicker it is."""
+_SEEN_NM = 550.0
 ABOVE, BELOW = 128, 32
 """Steps of a table over the cosine outside, from 0 to 1, and over what lies beyond total reflection."""
+_STEPS_OF_RIPPLE, _MOST_FINER = 4.0, 64
+"""How finely tables of thick films are summed up; with many layers less."""
 _NORMALISED = 16
 """Layers after which the fields are made 1 again."""
 AIR = Dispersion("air", "constant", (1.0,))
@@ -105,14 +111,33 @@ def _normal_part(index: np.ndarray, tangential2: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class Profile:
+    """How the thickness of a film of one layer varies from place to place."""
+
+    from_nm: float
+    to_nm: float
+    along: Vec3 | None
+    """Direction, in the object's own coordinates, from one to the other of its ends; None: from the object's origin to
+    what is farthest from it, by the square of the distance, as between a lens and a plate."""
+
+
+@dataclass(frozen=True)
 class Film:
     """What lies on a surface, from outside to inside."""
 
     layers: tuple[Layer, ...]
+    """Where the thickness varies, one, as thick as it ever is."""
     share: float | None = None
     """What it reflects at every wavelength and angle, whatever it is made of; None: what its layers do."""
     alone: bool = False
     """What is behind it is what is before it: a soap film."""
+    profile: Profile | None = None
+    """None: it is even."""
+
+    def of_thickness(self, share: float) -> Film:
+        """An even one, of one layer and so much of its thickness."""
+        (layer,) = self.layers
+        return Film((Layer(layer.medium, share * layer.nm),), alone=self.alone)
 
     @property
     def absorbs(self) -> bool:
@@ -146,7 +171,21 @@ class Stack:
         the spectrum is a difference: what is reflected from outside, reflected from behind, and let through, each for
         BELOW (where asked for) and ABOVE + 1 cosines. Of unpolarised light; or `polarised`, four of each: shares of s
         and of p, real and imaginary part of s times the conjugate of p."""
-        return _table(self, nm.tobytes(), polarised, below)
+        if self.film.profile is None:
+            return _table(self, nm.tobytes(), polarised, below)
+        # Without dispersion all depends on thickness by wavelength alone, which stands for x; but the phase is exact.
+        seen = np.array([_SEEN_NM])
+        first, (layer,), last = self.before, self.film.layers, self.behind
+        even, middle, last = (constant(float(np.real(of.index(seen))[0])) for of in (first, layer.medium, last))
+        stack = Stack(even, Film((Layer(middle, layer.nm),), alone=self.film.alone), last)
+        waves = np.real(layer.medium.index(nm)) / nm
+        at = float(middle.index(seen)[0]) / (waves.max() * np.linspace(1e-9, 1.0, len(nm)))
+        return _table(stack, at.tobytes(), polarised, below)
+
+    def waves(self, nm: np.ndarray) -> np.ndarray:
+        """Where the thickest place of a film that varies has its place in `table`, in place of x, (1, samples)."""
+        waves = np.real(self.film.layers[0].medium.index(nm)) / nm
+        return np.asarray(waves / waves.max())[None]
 
 
 def power(stack: Stack, cosine: float, nm: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -156,9 +195,12 @@ def power(stack: Stack, cosine: float, nm: np.ndarray) -> tuple[np.ndarray, np.n
     return 0.5 * (abs(a.r_s) ** 2 + abs(a.r_p) ** 2), 0.5 * (abs(a.t_s) ** 2 + abs(a.t_p) ** 2)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=32)
 def _table(stack: Stack, wavelengths: bytes, polarised: bool, below: bool) -> np.ndarray:
     nm = np.frombuffer(wavelengths, np.float64)
+    finer = _finer(stack.film, nm)
+    if finer > 1:
+        nm = np.interp(np.arange(finer * (len(nm) - 1) + 1) / finer, np.arange(len(nm)), nm)
     before2, behind2 = (np.real(medium.index(nm)) ** 2 for medium in (stack.before, stack.behind))
     cosine = np.linspace(0.0, 1.0, ABOVE + 1)[:, None]
     parts = [(1.0 - cosine**2) * before2]
@@ -168,11 +210,18 @@ def _table(stack: Stack, wavelengths: bytes, polarised: bool, below: bool) -> np
         parts.insert(0, before2 + t * t * np.maximum(behind2 - before2, 0.0))
     sine = np.sqrt(np.concatenate(parts))
     with np.errstate(under="ignore"):
-        return _running_means(stack, sine, nm, polarised)
+        return _running_means(stack, sine, nm, polarised, finer)
 
 
-def _running_means(stack: Stack, sine: np.ndarray, nm: np.ndarray, polarised: bool) -> np.ndarray:
-    """`Stack.table` at `sine`, (angles, samples)."""
+def _finer(film: Film, nm: np.ndarray) -> int:
+    """Into how many even steps a table's are divided: four for each ripple of the whole stack."""
+    way = 2.0 * sum(float(np.real(layer.medium.index(nm)).max()) * layer.nm for layer in film.layers)
+    wanted = np.ceil(_STEPS_OF_RIPPLE * way * np.abs(np.diff(1.0 / nm)).max())
+    return int(np.clip(wanted, 1, max(1, _MOST_FINER // max(1, len(film.layers)))))
+
+
+def _running_means(stack: Stack, sine: np.ndarray, nm: np.ndarray, polarised: bool, finer: int) -> np.ndarray:
+    """`Stack.table` at `sine`, (angles, samples), of which every one in so many is kept."""
     front = stack.amplitudes(sine, nm)
     # What absorbs nothing reflects as much from behind.
     back = stack.amplitudes(sine, nm, from_back=True) if polarised or stack.film.absorbs else front
@@ -184,6 +233,6 @@ def _running_means(stack: Stack, sine: np.ndarray, nm: np.ndarray, polarised: bo
         found += [abs(s) ** 2, abs(p) ** 2, (s * p.conj()).real, (s * p.conj()).imag] if polarised else [mean]
     values = np.concatenate(found)
     sums = np.cumsum(0.5 * (values[:, 1:] + values[:, :-1]), axis=1) / (len(nm) - 1)
-    table = np.pad(sums, ((0, 0), (1, 0))).astype(np.float32)
+    table = np.pad(sums[:, finer - 1 :: finer], ((0, 0), (1, 0))).astype(np.float32)
     table.flags.writeable = False
     return table

@@ -167,7 +167,7 @@ def _object(old: SceneObject, new: SceneObject) -> DirtyLevel:
         )
         if not same_absorption:
             return DirtyLevel.BUILD if (a.absorption is None) != (b.absorption is None) else max(cost, DirtyLevel.TRACE)
-        kinds = [(m.is_rough, m.thin, m.transmittance_rgb, m.is_crystal) for m in (a, b)]
+        kinds = [(m.is_rough, m.thin, m.transmittance_rgb, m.is_crystal, m.film) for m in (a, b)]
         if kinds[0] != kinds[1]:
             return DirtyLevel.BUILD
         same = a.priority == b.priority and a.microfacet_width == b.microfacet_width and a.axis == b.axis

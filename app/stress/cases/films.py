@@ -68,7 +68,7 @@ def film_stacks(_: Context, names: Sequence[str]) -> Measured:
                 off = max(off, 0.0 if film.absorbs else np.abs(reflected + passed - 1.0).max())
                 gained = max(gained, (reflected + passed).max() - 1.0)
                 ways = stack.amplitudes(np.array(sine), nm, from_back)
-                other = [film_amplitudes(tables, 0, 1.0, 1.5, sine, from_back, x) for x in nm]
+                other = [film_amplitudes(tables, 0, 1.0, 1.5, sine, from_back, x, -1.0) for x in nm]
                 differ = max(differ, np.abs(np.array(ways) - np.array(other).T).max())
         held: Held = {"energy": (off, 1e-9), "gained": (gained, 1e-9), "two ways": (differ, 1e-7)}
         yield measured(number, name, held)
@@ -99,8 +99,9 @@ def film_seen(context: Context, names: Sequence[str]) -> Measured:
             reflected, _ = _shares(Stack(AIR, STACKS[name], GLASS), float(np.sin(np.radians(degrees))), nm, False)
             expected = daylight_mean(reflected.reshape(-1, 64).mean(axis=1))
             seen = render_probe(context, _sheet(STACKS[name], degrees), PROBE).mean
-            # Measured: 2e-4 at most; dips as narrow as the camera's 24 parts of the spectrum, 0.044.
-            bound = 0.06 if name == "etalon of silver" else 2e-3
+            # Measured: 2e-4 at most; dips as narrow as the camera's 24 parts of the spectrum, 0.044; of 1,000 layers,
+            # whose ripples are finer than the table's wavelengths, 0.013.
+            bound = {"etalon of silver": 0.06, "1,000 layers": 0.02}.get(name, 2e-3)
             held[f"reflected at {degrees:g}°"] = float(np.abs(seen - expected).max()), bound
         yield measured(number, name, held)
 
