@@ -64,11 +64,11 @@ def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
         return np.interp(x, samples, page_x)
 
     photons = _photons(light, receiver, frame, to_page)
-    beams = _beams(light, receiver, frame, to_page)
+    beams, flux = _beams(light, receiver, frame, to_page)
     if not len(photons["x"]) and not len(beams["x"]):
         name = light.light_pass.scene.objects[item].name
         raise UserError(f"no caustic falls on '{name}': choose another receiver, or aim a light at glass near it")
-    head["window"] = _window(photons, beams)
+    head["window"] = _window(photons, beams, flux)
     unit = float(photons["throughput"].max(initial=0.0)) or 1.0
     photons["throughput"] = (photons["throughput"] / unit).astype("f2")
     photons["x"] = np.rint(np.clip(photons["x"], 0.0, 1.0) * 65535.0).astype("u2")
@@ -126,11 +126,14 @@ def _photons(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -
     }
 
 
-def _beams(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -> dict[str, np.ndarray]:
+def _beams(
+    light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Polygons, and the light that each holds, relative."""
     beams = light.light_pass.survey.beams
     polygons = None if beams is None or beams.found is None else beams.found.polygons
     if polygons is None:
-        return {"x": np.zeros((0, 2))}
+        return {"x": np.zeros((0, 2))}, np.zeros(0)
     assert beams is not None
     own, scale = beams.frames[receiver], light.buffers.space.scale
     assert np.allclose(own.axes, frame.axes), "beams lie in the frame of their receiver"
@@ -139,7 +142,7 @@ def _beams(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -> 
     edges = polygons.edges.copy().reshape(-1, 2, 4)
     edges[..., 2] -= edges[..., :2] @ shift
     edges[..., 2:] /= scale
-    return {
+    found = {
         "x": to_page(np.stack([polygons.x_lo, polygons.x_hi], axis=1)).astype("f4"),
         "density": polygons.density.astype("f4"),
         "slope": (polygons.slope * scale).astype("f4"),
@@ -150,40 +153,24 @@ def _beams(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -> 
         "hull_first": polygons.hull_start.astype("u4"),
         "hull": ((polygons.hulls + shift) / scale).astype("f4"),
     }
+    return found, polygons.flux
 
 
-def _window(photons: dict[str, np.ndarray], beams: dict[str, np.ndarray]) -> dict[str, float]:
-    """The rectangle of the plane that holds nearly all of the light."""
+def _window(photons: dict[str, np.ndarray], beams: dict[str, np.ndarray], flux: np.ndarray) -> dict[str, float]:
+    """The rectangle of the plane that holds nearly all of the light; `flux`: of each polygon."""
     places = [photons["position"].astype(float)]
     weights = [photons["throughput"][:, 1] * (photons["x"][:, 2] - photons["x"][:, 0])]
-    if len(beams["x"]):
-        corners = np.diff(beams["hull_first"].astype(int))
+    if len(flux):
+        counts = np.diff(beams["hull_first"].astype(int))
         places.append(beams["hull"].astype(float))
-        weights.append(np.repeat(_areas(beams) / np.maximum(corners, 1), corners))
+        weights.append(np.repeat(flux / np.maximum(counts, 1), counts))
     place, weight = np.concatenate(places), np.concatenate([w / max(float(w.sum()), 1e-300) for w in weights])
-    low, high = np.zeros(2), np.zeros(2)
-    for k in range(2):
-        order = np.argsort(place[:, k])
+    ends = np.zeros((2, 2))
+    for k, along in enumerate(place.T):
+        order = np.argsort(along)
         running = np.cumsum(weight[order])
-        ends = np.searchsorted(running, running[-1] * np.array([0.5 - 0.5 * _LIT, 0.5 + 0.5 * _LIT]))
-        low[k], high[k] = place[order[np.minimum(ends, len(order) - 1)], k]
-    side = np.maximum(high - low, 1e-3 * float((high - low).max()) + 1e-9)
-    low, high = low - _MARGIN * side, high + _MARGIN * side
-    return {
-        "u0": float(low[0]),
-        "v0": float(low[1]),
-        "u1": float(high[0]),
-        "v1": float(high[1]),
-        "texel": float(side.max()) / WINDOW_TEXELS,
-    }
-
-
-def _areas(beams: dict[str, np.ndarray]) -> np.ndarray:
-    """Light of each polygon's hull, relative, (M,)."""
-    hull, first = beams["hull"].astype(float), beams["hull_first"].astype(int)
-    owner = np.repeat(np.arange(len(first) - 1), np.diff(first))
-    following = np.arange(len(hull)) + 1
-    following[first[1:] - 1] = first[:-1]
-    twice = hull[:, 0] * hull[following, 1] - hull[following, 0] * hull[:, 1]
-    areas = np.bincount(owner, twice, len(first) - 1)
-    return np.abs(areas) * beams["density"].mean(axis=1) * np.ptp(beams["x"], axis=1)
+        ends[:, k] = np.interp(running[-1] * np.array([0.5 - 0.5 * _LIT, 0.5 + 0.5 * _LIT]), running, along[order])
+    side = np.maximum(np.ptp(ends, axis=0), 1e-3 * float(np.ptp(ends, axis=0).max()) + 1e-9)
+    low, high = ends[0] - _MARGIN * side, ends[1] + _MARGIN * side
+    corners = zip(("u0", "v0", "u1", "v1"), (*low.tolist(), *high.tolist()), strict=True)
+    return dict(corners) | {"texel": float(side.max()) / WINDOW_TEXELS}

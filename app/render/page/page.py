@@ -239,8 +239,10 @@ def _groups(live: LiveLight, glasses: Glasses) -> _Part:
             {"name": own.name or names[0], "objects": names, "row": first, "choices": [*range(first, len(rows))]}
         )
     array = np.array(rows, "f4").reshape(-1, len(VISIBLE_NM))
-    limits = {"gain_max": GAIN_MAX}
-    return _Part({"glass_n": array}, {"glasses": listed, "groups": edited, "limits": limits})
+    head: dict[str, Any] = {"glasses": listed, "groups": edited, "limits": {"gain_max": GAIN_MAX}}
+    if glasses.own is None and edited:
+        head["first_order"] = [{"what": "another dispersion moves light along lines, with the weights that it had"}]
+    return _Part({"glass_n": array}, head)
 
 
 def _spectra(scene: Scene) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
