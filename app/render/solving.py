@@ -39,7 +39,11 @@ _TEXELS, _FEWEST = 192, 8
 """Of a map's longer and shorter side."""
 _PARTS = 3
 """Along a side of one cell of a target, between which its mean is taken."""
-_SCANNED = 20
+_SCANNED, _LEVELS, _TRIED = 20, 6, 1 << 15
+"""Glasses that are tried at first, after the scene's own; how often more are; photons of each."""
+_NEAR, _LIT, _HARDLY = 0.3, 0.6, 0.95
+"""What their blurred light may differ by, of the scene's own glass, of one of some and of one of many, to begin with
+it."""
 _CELLS, _NARROW = 64, 32.0
 """Along a side of a target that is the scene as it is; length of a line over the breadth of its strip."""
 _BLURS = (0.12, 0.04, 0.0)
@@ -314,16 +318,16 @@ class Solver:
         """The glasses that object `index` may be of, pausing with the share done. Raises `UserError` where the target
         says nothing."""
         entries = [e for e in catalogue.entries() if e.dispersion.is_dispersive and self._may_be(index, e.dispersion)]
-        start = yield from self._scanned(index, entries)
-        known: dict[str, Gradient] = {}
         curves = np.stack([_at_bins(entry.dispersion, self._edges) for entry in entries])
+        start = yield from self._scanned(index, entries, curves)
+        known: dict[str, Gradient] = {}
         names = [entry.qualified_name for entry in entries]
         best, errors, columns = start, np.zeros(0), np.zeros((0, 0))
         for blur in _BLURS:
             seen: set[int] = set()
             while best not in seen and len(seen) < _STEPS:
                 seen.add(best)
-                begun = min(0.4 + 0.05 * len(known), 0.95)
+                begun = min(0.42 + 0.05 * len(known), 0.95)
                 if names[best] not in known:
                     its = set_dispersion(self.stage.scene, index, entries[best].dispersion)
                     path = f"objects.{its.objects[index].name}.{INDEX}"
@@ -349,24 +353,43 @@ class Solver:
             return False
         return True
 
-    def _scanned(self, index: int, entries: Sequence[catalogue.Entry]) -> Generator[float, None, int]:
-        """Of glasses evenly spread over n_d, the one whose blurred light is nearest."""
+    def _scanned(
+        self, index: int, entries: Sequence[catalogue.Entry], curves: np.ndarray
+    ) -> Generator[float, None, int]:
+        """The glass whose blurred light is nearest: the scene's own, or one of some spread over n_d, of more as long as
+        none lights the target. Raises `UserError` where none does."""
+        own = _at_bins(self.stage.scene.objects[index].material.dispersion, self._edges)
         by_index = np.argsort([entry.dispersion.n_d for entry in entries])
-        chosen = by_index[(np.linspace(0.01, 0.99, _SCANNED) * (len(entries) - 1)).astype(int)]
-        stages = [
-            replace(self.stage, scene=set_dispersion(self.stage.scene, index, entries[i].dispersion)) for i in chosen
-        ]
-        renderer = FrameRenderer(self.context, self._settings, stages, window=self.target.window)
-        errors = []
+        errors: dict[int, float] = {}
+        for level in range(_LEVELS):
+            ranks = np.linspace(0.01, 0.99, _SCANNED << max(level - 1, 0)) * (len(entries) - 1)
+            chosen = by_index[ranks.astype(int)] if level else [np.abs(curves - own).max(axis=1).argmin()]
+            fresh = [int(i) for i in chosen if int(i) not in errors]
+            found = yield from mapped(
+                self._lit(index, [entries[i] for i in fresh]), partial(_within, 0.07 * level, 0.07)
+            )
+            errors |= dict(zip(fresh, found, strict=True))
+            best = min(errors, key=errors.__getitem__)
+            if errors[best] < (_NEAR if not level else _LIT if level + 1 < _LEVELS else _HARDLY):
+                return best
+        raise UserError("no glass of the catalogue casts such light there: is the target's place right, and its scene?")
+
+    def _lit(self, index: int, entries: Sequence[catalogue.Entry]) -> Generator[float, None, list[float]]:
+        """What the light of each glass, blurred and of few photons, differs by from the target."""
+        scenes = (set_dispersion(self.stage.scene, index, entry.dispersion) for entry in entries)
+        stages = [replace(self.stage, scene=scene) for scene in scenes]
+        few = replace(self._settings, photons=min(self._settings.photons or _TRIED, _TRIED))
+        renderer = FrameRenderer(self.context, few, stages, window=self.target.window)
+        errors: list[float] = []
         try:
             for number, stage in enumerate(stages):
                 for share in renderer.steps(stage):
-                    yield 0.4 * (number + share) / len(stages)
+                    yield (number + share) / len(stages)
                 shown = self._colours(renderer.picture, placement(renderer.light), _BLURS[0]).ravel()
-                errors.append(_errors(shown[:, None], self._wanted(_BLURS[0]), np.zeros((1, 0)))[0])
+                errors.append(float(_errors(shown[:, None], self._wanted(_BLURS[0]), np.zeros((1, 0)))[0]))
         finally:
             renderer.release()
-        return int(chosen[int(np.argmin(errors))])
+        return errors
 
     def _by_bin(self, found: Gradient, blur: float) -> np.ndarray:
         """The light (n, 1 + bins) and its derivatives by the index in each bin."""
