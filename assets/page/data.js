@@ -23,7 +23,7 @@ function halfFloats() {
 
 const KINDS = { f4: Float32Array, f2: Uint16Array, u4: Uint32Array, i4: Int32Array, u2: Uint16Array, u1: Uint8Array };
 
-// `head`, and `array(name)`: its numbers as they are meant (scaled), or null where there is none.
+// `head`, and `array(name)`: its numbers, or null where there is none; 16 bits without a sign are shares of 1.
 export async function readData(page) {
   const head = JSON.parse(page.getElementById("head").textContent);
   const bytes = await bytesOf(page.getElementById("blob").textContent, head.compressed);
@@ -34,14 +34,11 @@ export async function readData(page) {
     return new KINDS[dtype](bytes.buffer, bytes.byteOffset + offset, shape.reduce((a, b) => a * b, 1));
   };
   const array = (name) => {
-    const about = head.arrays[name];
-    if (!about) return null;
-    const stored = raw(name), columns = about.shape.at(-1) ?? 1;
-    if (about.dtype === "f2") halves ??= halfFloats();
-    if (about.dtype !== "f2" && about.scale === undefined && about.origin === undefined) return stored;
-    const at = (value, k, otherwise) => (value === undefined ? otherwise : Array.isArray(value) ? value[k % columns] : value);
-    return Float32Array.from(stored, (value, k) =>
-      at(about.origin, k, 0) + at(about.scale, k, 1) * (about.dtype === "f2" ? halves[value] : value));
+    if (!head.arrays[name]) return null;
+    const stored = raw(name), { dtype } = head.arrays[name];
+    if (dtype === "f2") halves ??= halfFloats();
+    if (dtype !== "f2" && dtype !== "u2") return stored;
+    return Float32Array.from(stored, dtype === "f2" ? (bits) => halves[bits] : (value) => value / 65535);
   };
   const picture = (name, type) =>
     createImageBitmap(new Blob([raw(name)], { type }), { colorSpaceConversion: "none", premultiplyAlpha: "none" });

@@ -2,6 +2,7 @@
 
 import { BEAM_FRAGMENT, BEAM_VERTEX, SOLID_FRAGMENT, SOLID_VERTEX, SPLAT_FRAGMENT, SPLAT_VERTEX, VIEW_FRAGMENT, WHOLE_VERTEX } from "./shaders.js";
 import { SAMPLES } from "./spectra.js";
+import { inverse } from "./views.js";
 
 // What is missing for it, as a sentence; null where nothing is.
 export function lackOf(gl) {
@@ -34,7 +35,7 @@ export class Light {
     this.whole = gl.createVertexArray();
     this.counts = { draws: 0, bytes: 0 };
     this.photons = this.instances(photons, [4, 4, 4, 4, 3, 4]);
-    this.polygons = this.instances(beams, [4, 4, 4, 4, 4]);
+    this.polygons = this.instances(beams, [4, 4, 4, 4, 3]);
     if (beams.count) this.fill(this.edges, 1024, beams.edges.length / 4096, beams.edges);
     this.meshes = this.solids(head, array);
   }
@@ -144,16 +145,20 @@ export class Light {
       gl.uniform1i(at(name), unit);
     });
     gl.activeTexture(gl.TEXTURE7);
-    gl.uniform2i(at("size"), this.size[0], this.size[1]);
-    gl.uniform4f(at("area"), this.head.window.u0, this.head.window.v0, this.perUnit, 0);
+    gl.uniform2i(at("size"), ...this.size);
+    gl.uniformMatrix3fv(at("to_uv"), true, this.toUv);
+    gl.uniformMatrix3fv(at("to_texel"), true, this.toTexel);
   }
 
-  // Add up all light in a map whose longer side has `texels`.
-  gather(texels) {
-    const { gl, head } = this, { u0, v0, u1, v1 } = head.window;
-    this.perUnit = texels / Math.max(u1 - u0, v1 - v0);
-    // Even sizes: levels halve them.
-    this.size = [u1 - u0, v1 - v0].map((side) => Math.max(16, 16 * Math.ceil((side * this.perUnit) / 16)));
+  // Add up all light as it is seen by `toUv` (views.js) on so many pixels, or every `step`-th of them.
+  gather(toUv, width, height, step = 1) {
+    const { gl, head } = this;
+    // Sizes that all levels divide.
+    this.size = [width, height].map((side) => Math.max(32, 32 * Math.ceil(side / step / 32)));
+    // From texels, whose rows go up.
+    const [kx, ky] = [width / this.size[0], height / this.size[1]];
+    this.toUv = [0, 3, 6].flatMap((r) => [kx * toUv[r], -ky * toUv[r + 1], toUv[r + 2] + height * toUv[r + 1]]);
+    this.toTexel = inverse(this.toUv);
     const format = this.isFull ? gl.RGBA32F : gl.RGBA16F;
     this.resize(this.map, 1.5 * this.size[0], this.size[1], { internal: format, type: this.isFull ? gl.FLOAT : gl.HALF_FLOAT });
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.map.framebuffer);
@@ -196,14 +201,14 @@ export class Light {
   }
 
   // The picture, into the canvas. `mode`: 0 camera, 1 from above, 2 in space.
-  show(mode, toUv, exposure, mark, width, height) {
+  show(mode, exposure, mark, width, height) {
     const { gl, head } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, width, height);
     this.use(this.view, { map: this.map.texture, base: this.base, weight: this.weight, glass: this.glass.texture });
     gl.uniform2f(this.view.at("pixels"), width, height);
     gl.uniform1i(this.view.at("view"), mode);
-    gl.uniformMatrix3fv(this.view.at("to_uv"), true, toUv);
+    gl.uniform4f(this.view.at("window"), head.window.u0, head.window.v0, head.window.u1, head.window.v1);
     gl.uniform4f(this.view.at("whites"), head.camera?.base_white ?? 0, head.camera?.weight_white ?? 0, 2 ** exposure, 0);
     gl.uniform3f(this.view.at("diffuse"), ...(head.reflectance_rgb ?? [1, 1, 1]).map((r) => r / Math.PI));
     gl.uniform4f(this.view.at("mark"), ...(mark ?? [0, 0]), mark ? 1 : 0, Math.max(4, width / 90));
@@ -212,7 +217,7 @@ export class Light {
     this.counts.draws++;
   }
 
-  // Irradiance at the level-0 texels (linear Rec.709 and 0), coarser levels added, row 0 at v0: for tests and saving.
+  // Light on the texels of all levels (linear Rec.709 and 0), rows from below: for tests.
   readMap() {
     const { gl } = this, [width, height] = this.size, all = new Float32Array(4 * this.map.width * height);
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.map.framebuffer);

@@ -7,7 +7,7 @@ import { coloursOf, drawIndex, drawSpectrum, nmUnder } from "./plots.js";
 import { lampSpectrum, spectrumAt } from "./probe.js";
 import { beamRows, photonRows } from "./records.js";
 import { asBright, COUNT, indexOf, indexTable, lightTable, placesOf, single } from "./spectra.js";
-import { around, fromAbove, fromCamera, startAbove, startAround, uvAt } from "./views.js";
+import { areaAt, around, extent, fromAbove, fromCamera, startAbove, startAround, uvAt } from "./views.js";
 
 const SLOW_MS = 45, SETTLED_MS = 180, MODES = { camera: 0, above: 1, space: 2 };
 
@@ -32,9 +32,10 @@ async function start() {
   const spectra = head.spectra.map(({ lines }, i) => ({ density: density.subarray(COUNT * i, COUNT * (i + 1)), lines: lines ?? [] }));
   const nmOf = array("nm"), variable = array("variable"), reflectance = array("reflectance"), colours = coloursOf(observer);
   head.meshes ??= [];
+  const records = { photons: photonRows(head, array, shapeOf), beams: beamRows(array) }, lit = extent(records, head.window);
   const fresh = () => ({
     gain: 1, rows: head.groups.map(({ row }) => row), spectrum: -1, isSingle: false, nm: 550, exposure: 0, readNm: 588, playing: null,
-    view: head.camera?.pixel_to_uv ? "camera" : "above", above: startAbove(head), space: startAround(head), mark: null,
+    view: head.camera?.pixel_to_uv ? "camera" : "above", above: startAbove(lit), space: startAround(head, lit), mark: null,
   });
   const state = fresh(), canvas = byId("picture"), shown = { index: [], own: [], rows: [], x: null, paths: null };
   const dirty = { tables: true, map: true, glass: true, spectrum: true, words: true };
@@ -63,7 +64,7 @@ async function start() {
     if (canvas.width === width && canvas.height === height) return;
     Object.assign(canvas, { width, height });
     canvas.style.aspectRatio = `${width} / ${height}`;
-    dirty.glass = true;
+    dirty.glass = dirty.map = true;
   }
 
   function frame(now) {
@@ -73,8 +74,6 @@ async function start() {
     play(now);
     fit();
     if (dirty.tables) tables();
-    const full = Math.min(2 * Math.round(Math.max(head.window.u1 - head.window.u0, head.window.v1 - head.window.v0) / head.window.texel), 1024);
-    if (dirty.map) light.gather(coarse ? full / 2 : full);
     const { width, height } = canvas;
     toUv = state.view === "camera" ? fromCamera(head, width, height) : fromAbove(state.above, width, height);
     if (state.view === "space") {
@@ -83,7 +82,8 @@ async function start() {
       if (dirty.glass) light.drawGlass(camera, width, height);
       dirty.glass = false;
     }
-    light.show(MODES[state.view], toUv, (head.exposure_ev ?? 0) + state.exposure, markPixel(), width, height);
+    if (dirty.map) light.gather(toUv, width, height, coarse ? 2 : 1);
+    light.show(MODES[state.view], (head.exposure_ev ?? 0) + state.exposure, markPixel(), width, height);
     if (dirty.words) tell(state, shown.index);
     if (dirty.words && shown.index.length) {
       drawIndex(byId("index"), shown.index[0], shown.own[0], state.readNm, colours);
@@ -137,7 +137,7 @@ async function start() {
   // At the ring; of the lamp while there is none.
   function spectrum() {
     dirty.spectrum = false;
-    const about = { head, ...records, paths: shown.paths, rows: shown.rows, x: shown.x, texel: head.window.texel };
+    const about = { head, ...records, paths: shown.paths, rows: shown.rows, x: shown.x, texel: state.mark ? Math.sqrt(areaAt(toUv, markPixel() ?? [0, 0])) : 0 };
     const found = state.mark ? spectrumAt(state.mark, about) : lampSpectrum(shown.rows[0]);
     drawSpectrum(byId("here"), found, state.readNm, colours);
     const most = found.reduce((best, bin) => (bin.power > best.power ? bin : best));
@@ -161,7 +161,9 @@ async function start() {
     const isLight = names.some((name) => ["glass", "gain", "spectrum", "nm", "isSingle", "rows"].includes(name));
     if (isLight) dirty.tables = dirty.map = true;
     dirty.words = true;
-    dirty.glass ||= names.includes("space") || names.includes("view");
+    const isSeen = ["space", "view", "above"].some((name) => names.includes(name));
+    dirty.glass ||= isSeen;
+    dirty.map ||= isSeen;
     dirty.spectrum ||= isLight || names.includes("mark") || names.includes("readNm");
     queue();
   }
@@ -262,7 +264,6 @@ async function start() {
     return null;
   }
 
-  const records = { photons: photonRows(head, array, shapeOf), beams: beamRows(array) };
   canvas.setAttribute("aria-label", `${head.title}: the picture. ${head.description ?? ""}`);
   bindPanel(head, glass, set, act);
   bindReading(byId("index"), nmUnder, state, set);

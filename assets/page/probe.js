@@ -52,7 +52,7 @@ function addPhotons(found, power, { rows, count }, paths, smoothing, texel, u, v
 
 function addBeams(found, power, { rows, count, edges }, u, v) {
   for (let i = 0; i < count; i++) {
-    const r = rows.subarray(20 * i, 20 * i + 20), du = u - r[0], dv = v - r[1], reach = Math.hypot(r[2], r[3]);
+    const r = rows.subarray(19 * i, 19 * i + 19), du = u - r[0], dv = v - r[1], reach = Math.hypot(r[2], r[3]);
     if (Math.abs(du * r[2] + dv * r[3]) > reach * reach * 1.001 || Math.abs(dv * r[2] - du * r[3]) > reach * r[4] * 1.001) continue;
     found.forEach((bin, k) => {
       if (bin.x < r[16] || bin.x >= r[17]) return;

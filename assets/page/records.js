@@ -29,9 +29,9 @@ export function photonRows(head, array, shapeOf) {
   return { rows, count };
 }
 
-// Rows of 20: a rectangle that holds the polygon; edges and row; density; slope; x. Edges about its middle, two texels each.
+// Rows of 19: a rectangle that holds the polygon; edges and row; density; slope; x and least penumbra. Edges about its middle, two texels each.
 export function beamRows(array) {
-  const x = array("beams.x"), count = x ? x.length / 2 : 0, rows = new Float32Array(20 * count);
+  const x = array("beams.x"), count = x ? x.length / 2 : 0, rows = new Float32Array(19 * count);
   if (!count) return { rows, count, edges: new Float32Array(0) };
   const [density, slope, centre, light, first, edge, hullFirst, hull] =
     ["density", "slope", "centre", "light", "first", "edge", "hull_first", "hull"].map((name) => array(`beams.${name}`));
@@ -39,12 +39,16 @@ export function beamRows(array) {
   for (let i = 0; i < count; i++) {
     const { middle, along, half } = rectangle(hull, hullFirst[i], hullFirst[i + 1]), [a, b, c] = density.subarray(3 * i);
     rows.set([...middle, along[0] * half[0], along[1] * half[0], half[1], first[i], first[i + 1] - first[i], light?.[i] ?? 0,
-      a, 4 * b - 3 * a - c, 2 * (a - 2 * b + c), 0, slope[2 * i], slope[2 * i + 1], centre[2 * i], centre[2 * i + 1], x[2 * i], x[2 * i + 1], 0, 0], 20 * i);
+      a, 4 * b - 3 * a - c, 2 * (a - 2 * b + c), 0, slope[2 * i], slope[2 * i + 1], centre[2 * i], centre[2 * i + 1], x[2 * i], x[2 * i + 1]], 19 * i);
+    // Of a polygon narrower than its penumbrae only their mean is seen: all its edges are as soft.
+    const softness = Array.from(edge.subarray(8 * first[i], 8 * first[i + 1])).filter((_, k) => k % 4 === 3).map((soft) => Math.max(soft, 0));
+    const widest = Math.max(...softness), isNarrow = Math.sqrt(4 * half[0] * half[1]) < 4 * widest;
+    rows[19 * i + 18] = isNarrow ? widest : Math.min(...softness);
     for (let e = first[i]; e < first[i + 1]; e++) {
       const line = edge.subarray(8 * e, 8 * e + 8);
       const scale = 2 / (Math.hypot(line[0], line[1]) + Math.hypot(line[4], line[5]));
       const [from, to] = [0, 4].map((k) =>
-        [line[k] * scale, line[k + 1] * scale, (line[k + 2] + line[k] * middle[0] + line[k + 1] * middle[1]) * scale, line[k + 3]]);
+        [line[k] * scale, line[k + 1] * scale, (line[k + 2] + line[k] * middle[0] + line[k + 1] * middle[1]) * scale + (line[k + 3] < 0 && !isNarrow ? 1e6 : 0), isNarrow ? widest : line[k + 3]]);
       edges.set(from, 8 * e);
       edges.set(to.map((value, k) => value - from[k]), 8 * e + 4);
     }

@@ -1,8 +1,9 @@
-// The page's shaders: light of photons and beams added up in a map of the receiver, and pictures made of the map.
-// The map holds irradiance, linear Rec.709. Level 0 has the finest texels; broad photons are drawn in coarser ones, to
-// its right. A photon is drawn as the desktop program draws it (shaders/light/splat_shapes.glsl there).
+// The page's shaders: light of photons and beams added up in a map of what is seen, and pictures made of the map.
+// A texel of the map's level 0 is a pixel and holds the light that falls on what it shows of the receiver, linear
+// Rec.709. Broad photons are drawn in coarser texels, to its right. A photon is drawn as the desktop program draws it
+// (shaders/light/splat_shapes.glsl there).
 
-export const LEVELS = 4;
+export const LEVELS = 6;
 
 const COMMON = `#version 300 es
 precision highp float;
@@ -10,10 +11,15 @@ precision highp int;
 precision highp sampler2D;
 #define LEVELS ${LEVELS}
 uniform ivec2 size;         // texels of level 0
-uniform vec4 area;          // its lower corner, texels per unit, 0
+uniform mat3 to_uv, to_texel;  // (place, 1) to (place, 1) times a weight, which is positive where it is seen
 vec4 rect_of(int level) {
   vec2 s = vec2(size), low = level == 0 ? vec2(0.0) : vec2(s.x, s.y - s.y * exp2(float(1 - level)));
   return vec4(low, low + s * exp2(float(-level)));
+}
+// Area on the receiver of the texel about a place.
+float texel_area(vec2 texel) {
+  float w = (to_uv * vec3(texel, 1.0)).z;
+  return abs(determinant(to_uv)) / max(w * w * w, 1e-30);
 }
 `;
 
@@ -90,11 +96,17 @@ void main() {
   float x_lo = max(span.x, support.x), x_hi = min(span.z, support.y);
   if (x_hi <= x_lo) return;
   vec2 to_lo = shift_to(x_lo), to_hi = shift_to(x_hi);
-  vec2 chord = area.z * (to_hi - to_lo), centre = area.z * (place_v2.xy - area.xy + 0.5 * (to_lo + to_hi));
-  vec2 s = smoothing * area.z * sides.xy, t = smoothing * area.z * sides.zw;
+  // In texels, by the derivatives in the middle; the perspective that these lack is the rasteriser's: a place d texels
+  // away is seen d / (1 + fan · d) away.
+  vec3 seen = to_texel * vec3(place_v2.xy + 0.5 * (to_lo + to_hi), 1.0);
+  if (seen.z <= 0.0) return;
+  vec2 centre = seen.xy / seen.z;
+  mat2 j = mat2(to_texel[0].xy - centre * to_texel[0].z, to_texel[1].xy - centre * to_texel[1].z) / seen.z, back = inverse(j);
+  vec2 fan = vec2(to_texel[0].z, to_texel[1].z) * back / seen.z;
+  vec2 chord = j * (to_hi - to_lo), s = smoothing * (j * sides.xy), t = smoothing * (j * sides.zw);
   float bend = 0.0;
   if (BENT) {
-    vec2 half_way = area.z * (shift_to(0.5 * (x_lo + x_hi)) - to_lo);
+    vec2 half_way = j * (shift_to(0.5 * (x_lo + x_hi)) - to_lo);
     bend = clamp(4.0 * dot(half_way, chord) / max(dot(chord, chord), 1e-12) - 2.0, -0.9, 0.9);
   }
   // Broad photons go to coarser texels, whose bilinear reading blurs them too.
@@ -105,7 +117,7 @@ void main() {
   for (int k = 1; k < LEVELS; ++k)
     if (thin * finer * finer > 2.25) { level = k; finer *= 0.5; taken = 0.25 * taken + 11.0 / 48.0; }
   s *= finer; t *= finer; chord *= finer; centre *= finer; cov *= finer * finer; radius *= finer * finer;
-  difference *= finer * finer; thin *= finer * finer;
+  difference *= finer * finer; thin *= finer * finer; fan /= finer;
   // Along the sweep; or along what is too thin for that, if its sweep leaves it by less than half a texel.
   vec2 e = difference >= 0.0 ? vec2(radius + difference, cov.y) : vec2(cov.y, radius - difference);
   e = dot(e, e) > 0.0 ? normalize(e) : vec2(1.0, 0.0);
@@ -139,7 +151,7 @@ void main() {
     vec2 k = i == 0 ? vec2(1, 0) : i == 1 ? vec2(0, 1) : i == 2 ? vec2(1, 1) : vec2(1, -1);
     grid += 2.0 * damping(k, sweep) * cos(TWO_PI * dot(k, centre - 0.5));
   }
-  float amplitude = area.z * area.z * finer * finer
+  float amplitude = 1.0
     / (box * kept(edge, box, root) * kept(reach, sweep, sigma) * clamp(grid, 0.7, 1.4));
   vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
   // Splats about a lattice's points add up to 1 and a ripple, which each takes off.
@@ -147,7 +159,7 @@ void main() {
   at.zw = vec2(0.0);
   if (waves != vec4(0.0)) {
     vec2 k[3];
-    k[0] = waves.xy / (area.z * finer); k[1] = waves.zw / (area.z * finer); k[2] = k[0] + k[1];
+    k[0] = waves.xy * back / finer; k[1] = waves.zw * back / finer; k[2] = k[0] + k[1];
     float swept = sweep * sweep * TEXEL, share = swept / (along2 + swept);
     vec3 heights, seen;
     for (int i = 0; i < 3; ++i) {
@@ -170,8 +182,10 @@ void main() {
   weights.w = bend;
   shape = vec4(0.5 * box * SQRT_HALF / root, 0.0, 1.0 / sigma, span.w);
   rect = rect_of(level);
-  vec2 texel = rect.xy + centre + corner.x * long_side + corner.y * short_side;
-  gl_Position = vec4(texel / vec2(1.5 * float(size.x), size.y) * 2.0 - 1.0, 0.0, 1.0);
+  fan *= min(1.0, 0.8 / max(abs(dot(fan, long_side)) + abs(dot(fan, short_side)), 1e-9));
+  vec2 beside = corner.x * long_side + corner.y * short_side;
+  float w = 1.0 + dot(fan, beside);
+  gl_Position = vec4(((rect.xy + centre) * w + beside) / vec2(1.5 * float(size.x), size.y) * 2.0 - w, 0.0, w);
 }`;
 
 export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + `
@@ -190,7 +204,8 @@ float carried_at(float x) {
 }
 void main() {
   if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
-  float share = 0.5 * (error_function(min(at.x + shape.x, 6.0)) - error_function(max(at.x - shape.x, -6.0)));
+  float w = 1.0 / gl_FragCoord.w;
+  float share = w * w * 0.5 * (error_function(min(at.x + w * shape.x, 6.0)) - error_function(max(at.x - w * shape.x, -6.0)));
   vec3 away = abs(fract(vec3(at.zw, at.z + at.w)) * 2.0 - 1.0);
   share *= 1.0 - dot(ripple, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);
   int row = int(shape.w);
@@ -224,40 +239,64 @@ layout(location = 0) in vec4 quad;      // middle, half of its long side
 layout(location = 1) in vec4 more;      // half of its short side (length), first edge, edges, row
 layout(location = 2) in vec4 density;   // 1, t, t²; 0
 layout(location = 3) in vec4 slope;     // relative, per unit; about
-layout(location = 4) in vec4 span;      // x: from, to; least and most that edges reach out, texels: 0
+layout(location = 4) in vec3 span;      // x: from, to; least penumbra, units
 flat out vec4 parabola, tilt, band;
+flat out vec3 about;
 flat out ivec3 list;
-out vec2 place;
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   if (span.y <= support.x || span.x >= support.y) return;
   vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
   float reach = length(quad.zw);
   vec2 e = reach > 0.0 ? quad.zw / reach : vec2(1.0, 0.0);
-  float margin = 0.75 / area.z;
-  place = corner.x * e * (reach + margin) + corner.y * vec2(-e.y, e.x) * (more.x + margin);
+  vec2 right = e * reach, up = vec2(-e.y, e.x) * more.x;
+  vec3 seen = to_texel * vec3(quad.xy + corner.x * right + corner.y * up, 1.0), middle = to_texel * vec3(quad.xy, 1.0);
+  // A texel farther out, as the sides go there.
+  vec2 at = seen.xy / seen.z;
+  vec2 along = (to_texel * vec3(right, 0.0)).xy - at * dot(vec2(to_texel[0].z, to_texel[1].z), right),
+       across = (to_texel * vec3(up, 0.0)).xy - at * dot(vec2(to_texel[0].z, to_texel[1].z), up);
+  if (length(along) < 1e-6 * length(across)) along = vec2(across.y, -across.x);
+  if (length(across) < 1e-6 * length(along)) across = vec2(-along.y, along.x);
+  along = normalize(along);
+  across = normalize(across);
+  float spread = max(abs(along.x * across.y - along.y * across.x), 0.1);
+  vec2 margin = 0.75 * (corner.x * along + corner.y * across) / spread;
   parabola = density;
-  tilt = vec4(slope.xy, slope.zw - quad.xy);
+  tilt = slope;
   band = vec4(span.xy, 0.0, 0.0);
+  // Soft ones in texels as coarse as a quarter of their penumbrae.
+  float soft = span.z / sqrt(texel_area(middle.xy / middle.z));
+  int level = clamp(int(floor(log2(0.25 * sqrt(1.0 + 4.0 * soft * soft)))), 0, LEVELS - 1);
+  if (middle.z <= 0.0) level = 0;
+  about = vec3(quad.xy, level);
+  vec2 low = rect_of(level).xy;
+  float finer = exp2(float(-level));
   list = ivec3(more.yzw);
-  gl_Position = vec4((quad.xy + place - area.xy) * area.z / vec2(1.5 * float(size.x), size.y) * 2.0 - 1.0, 0.0, 1.0);
+  gl_Position = vec4((seen.xy * finer + (margin + low) * seen.z) / vec2(1.5 * float(size.x), size.y) * 2.0 - seen.z, 0.0, seen.z);
 }`;
 
 export const BEAM_FRAGMENT = COMMON + TABLES + `
 uniform sampler2D edges;    // two texels an edge: x, y, c, softness at the band's start; their change
 flat in vec4 parabola, tilt, band;
+flat in vec3 about;          // the rectangle's middle; level
 flat in ivec3 list;
-in vec2 place;              // about the quad's middle
 out vec4 deposited;
 vec4 edge_texel(int i) { return texelFetch(edges, ivec2(i & 1023, i >> 10), 0); }
-// Half the side of the square over which an edge is averaged, units: a texel and the penumbra.
-float window(float softness) { return sqrt(1.0 + 4.0 * area.z * area.z * max(softness, 0.0) * max(softness, 0.0)) / area.z; }
+vec2 place;                 // about that
+mat2 sides;                 // of the texel on the receiver
+// An edge where the texel is the square about 0: normal, distance inside; and the side of the square over which it is
+// averaged, for the texel and the penumbra.
+vec4 seen_line(vec4 line) {
+  vec2 n = line.xy * sides;
+  float per = inversesqrt(max(dot(n, n), 1e-30)), soft = max(line.w, 0.0) * length(line.xy) * per;
+  return vec4(n, dot(line.xy, place) + line.z, sqrt(1.0 + 4.0 * soft * soft));
+}
 // Part of the texel within all edges at t: what borders it, by lengths times distances (shaders/light/beam_coverage.glsl
 // of the desktop program).
 vec4 line_at(int e, float t) {
-  vec4 line = edge_texel(2 * e) + t * edge_texel(2 * e + 1);
+  vec4 line = seen_line(edge_texel(2 * e) + t * edge_texel(2 * e + 1));
   float per = inversesqrt(max(dot(line.xy, line.xy), 1e-30));
-  return vec4(line.xy * per, (dot(line.xy, place) + line.z) * per / window(line.w), 0.0);
+  return vec4(line.xy * per, line.z * per / line.w, 0.0);
 }
 vec2 in_texel(vec2 n, float h) {
   vec2 foot = -h * n, d = vec2(-n.y, n.x);
@@ -265,7 +304,15 @@ vec2 in_texel(vec2 n, float h) {
   vec2 p = (-0.5 - foot) / d, q = (0.5 - foot) / d, low = min(p, q), high = max(p, q);
   return vec2(max(low.x, low.y), min(high.x, high.y));
 }
+int crossings = 0, crossing = 0;
 float covered(float t) {
+  if (crossings == 1) {
+    vec4 line = line_at(list.x + crossing, t);
+    vec2 n = abs(line.xy);
+    float sum = 0.5 * (n.x + n.y), difference = 0.5 * abs(n.x - n.y), h = abs(line.z), missing = max(sum - h, 0.0);
+    float share = h <= difference ? 0.5 + h / max(n.x, n.y) : 1.0 - missing * missing / max(2.0 * n.x * n.y, 1e-12);
+    return line.z >= 0.0 ? share : 1.0 - share;
+  }
   float twice = 0.0;
   vec4 low = vec4(-0.5), high = vec4(0.5);
   for (int i = 0; i < list.y; ++i) {
@@ -311,15 +358,23 @@ void add(vec2 interval, int parts, bool whole) {
   }
 }
 void main() {
+  vec4 rect = rect_of(int(about.z));
+  if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
+  float wider = exp2(about.z);
+  vec2 texel = (gl_FragCoord.xy - rect.xy) * wider;
+  vec3 uvw = to_uv * vec3(texel, 1.0);
+  if (uvw.z <= 0.0) discard;
+  vec2 uv = uvw.xy / uvw.z;
+  place = uv - about.xy;
+  sides = mat2(to_uv[0].xy - uv * to_uv[0].z, to_uv[1].xy - uv * to_uv[1].z) * wider / uvw.z;
   float wide = band.y - band.x;
   vec2 lit = wide > 0.0 ? (clamp(support, band.xx, band.yy) - band.x) / wide : vec2(0.0, 1.0), touched = lit, whole = lit;
   for (int i = 0; i < list.y; ++i) {
-    vec4 start = edge_texel(2 * (list.x + i)), change = edge_texel(2 * (list.x + i) + 1);
-    float h = dot(start.xy, place) + start.z, dh = dot(change.xy, place) + change.z;
-    float r = 0.5 * (abs(start.x) + abs(start.y)) * window(start.w);
-    vec2 end = start.xy + change.xy;
-    float dr = 0.5 * (abs(end.x) + abs(end.y)) * window(start.w + change.w) - r;
+    vec4 start = edge_texel(2 * (list.x + i)), from = seen_line(start), to = seen_line(start + edge_texel(2 * (list.x + i) + 1));
+    float h = from.z, dh = to.z - h, r = 0.5 * (abs(from.x) + abs(from.y)) * from.w;
+    float dr = 0.5 * (abs(to.x) + abs(to.y)) * to.w - r;
     vec2 touches = positive(h + r, dh + dr), covers = positive(h - r, dh - dr);
+    if (covers.x > lit.x || covers.y < lit.y) { crossings++; crossing = i; }
     touched = vec2(max(touched.x, touches.x), min(touched.y, touches.y));
     whole = vec2(max(whole.x, covers.x), min(whole.y, covers.y));
   }
@@ -335,7 +390,7 @@ void main() {
     float t = (line.w - band.x) / wide;
     if (t >= touched.x && t <= touched.y) sum += covered(t) * (parabola.x + t * (parabola.y + t * parabola.z)) * line.rgb;
   }
-  deposited = vec4(max(1.0 + dot(tilt.xy, place - tilt.zw), 0.0) * sum, 0.0);
+  deposited = vec4(max(1.0 + dot(tilt.xy, uv - tilt.zw), 0.0) * texel_area(texel) * wider * wider * sum, 0.0);
 }`;
 
 export const WHOLE_VERTEX = `#version 300 es
@@ -348,7 +403,7 @@ uniform sampler2D weight;   // camera: share of the receiver's light in each pix
 uniform sampler2D glass;    // in space: the glass as it is seen
 uniform vec2 pixels;
 uniform int view;           // 0 camera, 1 from above, 2 in space
-uniform mat3 to_uv;         // of (pixel right, pixel down, 1)
+uniform vec4 window;        // where light of the glass lands
 uniform vec4 whites;        // of base, of weight; 2^exposure; 0
 uniform vec3 diffuse;       // reflectance / pi
 uniform vec4 mark;          // where the finger is: pixels right, down; 1 if it is
@@ -361,17 +416,10 @@ vec3 bilinear(int level, vec2 place) {
   vec3 low = mix(texelFetch(map, i, 0).rgb, texelFetch(map, i + ivec2(1, 0), 0).rgb, f.x);
   return mix(low, mix(texelFetch(map, i + ivec2(0, 1), 0).rgb, texelFetch(map, i + 1, 0).rgb, f.x), f.y);
 }
-// The mean of the map over a pixel of sides dx, dy about a place, in texels.
-vec3 irradiance(vec2 place, vec2 dx, vec2 dy) {
-  if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, vec2(size)))) return vec3(0.0);
+vec3 irradiance(vec2 texel) {
   vec3 sum = vec3(0.0);
-  for (int level = 1; level < LEVELS; ++level) sum += bilinear(level, place * exp2(float(-level)));
-  int across = clamp(int(ceil(length(dx))), 1, 4), up = clamp(int(ceil(length(dy))), 1, 4);
-  vec3 fine = vec3(0.0);
-  for (int j = 0; j < up; ++j)
-    for (int i = 0; i < across; ++i)
-      fine += bilinear(0, place + ((float(i) + 0.5) / float(across) - 0.5) * dx + ((float(j) + 0.5) / float(up) - 0.5) * dy);
-  return sum + fine / float(across * up);
+  for (int level = 0; level < LEVELS; ++level) sum += bilinear(level, texel * exp2(float(-level))) * exp2(float(-2 * level));
+  return sum / texel_area(texel);
 }
 float fifth_powers(vec3 c) { vec3 q = c * c; return dot(q * q, c); }
 float norm(vec3 c) { float most = max(max(max(c.r, c.g), c.b), 1e-30); return most * pow(fifth_powers(c / most), 0.2); }
@@ -390,17 +438,16 @@ vec3 encoded(vec3 c) {
   return mix(1.055 * pow(max(c, 0.0031308), vec3(1.0 / 2.4)) - 0.055, 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
 }
 void main() {
-  vec2 pixel = vec2(gl_FragCoord.x, pixels.y - gl_FragCoord.y);
-  vec3 uvw = to_uv * vec3(pixel, 1.0), right = to_uv * vec3(pixel + vec2(1.0, 0.0), 1.0), down = to_uv * vec3(pixel + vec2(0.0, 1.0), 1.0);
-  vec2 texel = (uvw.xy / uvw.z - area.xy) * area.z;
-  vec2 dx = (right.xy / right.z - area.xy) * area.z - texel, dy = (down.xy / down.z - area.xy) * area.z - texel;
-  vec3 rgb = uvw.z > 0.0 ? irradiance(texel, dx, dy) : vec3(0.0);
+  vec2 pixel = vec2(gl_FragCoord.x, pixels.y - gl_FragCoord.y), texel = gl_FragCoord.xy / pixels * vec2(size);
+  vec3 uvw = to_uv * vec3(texel, 1.0);
+  vec3 rgb = uvw.z > 0.0 ? irradiance(texel) : vec3(0.0);
   if (view == 0) {
     vec2 at = pixel / pixels;
     rgb = whites.x * pow(texture(base, at).rgb, vec3(2.4)) + whites.y * texture(weight, at).rgb * rgb;
   } else {
     // A faint light shows where the receiver is: its window brighter than what is beyond.
-    bool inside = uvw.z > 0.0 && all(greaterThan(texel, vec2(0.0))) && all(lessThan(texel, vec2(size)));
+    vec2 uv = uvw.xy / uvw.z;
+    bool inside = uvw.z > 0.0 && all(greaterThan(uv, window.xy)) && all(lessThan(uv, window.zw));
     rgb = diffuse * rgb + (inside ? 0.012 : view == 2 && uvw.z > 0.0 ? 0.006 : 0.002) / whites.z;
   }
   vec3 display = encoded(tone(rgb * whites.z));

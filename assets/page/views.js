@@ -13,6 +13,18 @@ export const uvAt = (m, px, py) => {
   return w > 0 ? [u / w, v / w] : null;
 };
 
+export function inverse([a, b, c, d, e, f, g, h, i]) {
+  const minors = [e * i - f * h, c * h - b * i, b * f - c * e, f * g - d * i, a * i - c * g, c * d - a * f, d * h - e * g, b * g - a * h, a * e - b * d];
+  const area = a * minors[0] + b * minors[3] + c * minors[6];
+  return minors.map((minor) => minor / area);
+}
+
+// Area on the receiver of the pixel at a place.
+export function areaAt(m, [px, py]) {
+  const [a, b, c, d, e, f, g, h, i] = m, weight = g * px + h * py + i;
+  return Math.abs((a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)) / weight ** 3);
+}
+
 // The scene's own camera, on a canvas of another size.
 export function fromCamera(head, width, height) {
   const kx = head.camera.width / width, ky = head.camera.height / height, m = head.camera.pixel_to_uv.flat();
@@ -44,15 +56,35 @@ export function around(head, { target, turn, lift, distance }, width, height) {
   return { toUv, eye, toClip: [...row(right, fx), ...row(over, fy), ...depth, ...row(toward, 1)] };
 }
 
-// Where `around` begins: from the scene's camera, at the middle of what is lit.
-export function startAround(head) {
-  const { plane, window: w } = head, target = plus(plus(plane.origin, plane.u, (w.u0 + w.u1) / 2), plane.v, (w.v0 + w.v1) / 2);
-  const up = upOf(head), side = unit(cross(up, Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 0, 1])), ahead = cross(up, side);
-  const from = unit(head.camera ? minus(head.camera.eye, target) : plus(plus(side, ahead, 1), up, 1));
-  return { target, turn: Math.atan2(dot(from, ahead), dot(from, side)), lift: Math.asin(Math.min(Math.max(dot(from, up), 0.2), 0.95)), distance: 1.7 * Math.max(w.u1 - w.u0, w.v1 - w.v0) };
+// Where most light lands, four fifths of it along u and along v: middle and size, by the rows of records.js.
+export function extent({ photons, beams }, w) {
+  const places = [];
+  const each = ({ rows, count }, width, add) => {
+    for (let i = 0, step = Math.ceil(count / 3000); i < count; i += step) add(rows.subarray(width * i, width * i + width));
+  };
+  each(photons, 23, (r) => places.push([r[0], r[1], r[17]]));
+  each(beams, 19, (r) => [-1, 1].forEach((k) => places.push([r[0] + k * r[2], r[1] + k * r[3], r[8] * r[4] * Math.hypot(r[2], r[3])])));
+  const total = places.reduce((sum, place) => sum + place[2], 0);
+  const ends = (axis, from, to) => {
+    let below = 0, low = null, high = from;
+    for (const place of places.toSorted((p, q) => p[axis] - q[axis])) {
+      below += place[2] / total;
+      if (below >= 0.1) low ??= place[axis];
+      if (below <= 0.9) high = place[axis];
+    }
+    return total > 0 ? [(low + high) / 2, Math.max(high - low, 0.02 * (to - from))] : [(from + to) / 2, to - from];
+  };
+  const [u, v] = [ends(0, w.u0, w.u1), ends(1, w.v0, w.v1)];
+  return { middle: [u[0], v[0]], size: 1.5 * Math.max(u[1], v[1]) };
 }
 
-// Where `fromAbove` begins: all that is lit.
-export function startAbove({ window: w }) {
-  return { centre: [(w.u0 + w.u1) / 2, (w.v0 + w.v1) / 2], across: 1.05 * Math.max(w.u1 - w.u0, w.v1 - w.v0) };
+// Where `around` begins: from the scene's camera, at the middle of what is lit.
+export function startAround(head, { middle, size }) {
+  const { plane } = head, target = plus(plus(plane.origin, plane.u, middle[0]), plane.v, middle[1]);
+  const up = upOf(head), side = unit(cross(up, Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 0, 1])), ahead = cross(up, side);
+  const from = unit(head.camera ? minus(head.camera.eye, target) : plus(plus(side, ahead, 1), up, 1));
+  return { target, turn: Math.atan2(dot(from, ahead), dot(from, side)), lift: Math.asin(Math.min(Math.max(dot(from, up), 0.3), 0.95)), distance: 1.7 * size };
 }
+
+// Where `fromAbove` begins.
+export const startAbove = ({ middle, size }) => ({ centre: middle, across: size });

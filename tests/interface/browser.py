@@ -65,7 +65,7 @@ class Browser:
                 assert "error" not in answer, f"{method}: {answer['error']}"
                 return dict(answer["result"])
 
-    def open(self, page: Path, width: int = 1280, height: int = 800, scheme: str = "light") -> None:
+    def open(self, page: Path, width: int = 480, height: int = 600, scheme: str = "light") -> None:
         """Load a file, and wait until it shows a picture or says why not."""
         self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600

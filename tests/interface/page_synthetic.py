@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import base64
-import json
-import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from spectrasplat.base.paths import assets_dir
+from spectrasplat.render.page.document import document
 
 NM = np.arange(380.0, 781.0)
 N_AT_0, N_AT_1 = 1.56, 1.50
@@ -47,32 +44,7 @@ def page(things: dict[str, np.ndarray], lines: list[list[float]] | None = None) 
         "glass_n": np.stack([glass(), glass(0.006)]).astype("f4"), "nm": NM.astype("f4"),
         "variable": glass()[None].astype("f4"),
     }  # fmt: skip
-    return html(head, arrays)
-
-
-def html(head: dict[str, Any], arrays: dict[str, np.ndarray]) -> str:
-    """The page as one file."""
-    blob, told = b"", {}
-    for name, values in arrays.items():
-        told[name] = {"dtype": values.dtype.str[1:], "shape": list(values.shape), "offset": len(blob)}
-        blob += values.tobytes() + b"\0" * (-values.nbytes % 4)
-    folder = assets_dir() / "page"
-    scripts = "\n".join((folder / name).read_text("utf-8") for name in modules())
-    data = f'<script type="application/json" id="head">{json.dumps(head | {"arrays": told})}</script>'
-    data += f'<script type="text/plain" id="blob">{base64.b64encode(blob).decode()}</script>'
-    parts = {
-        "/*STYLE*/": (folder / "page.css").read_text("utf-8"),
-        "<!--DATA-->": data,
-        "/*SCRIPT*/": re.sub(r"^import .*;\n|^export ", "", scripts, flags=re.MULTILINE),
-    }
-    text = (folder / "page.html").read_text("utf-8")
-    for mark, content in parts.items():
-        text = text.replace(mark, content)
-    return text
-
-
-def modules() -> list[str]:
-    return (assets_dir() / "page" / "modules.txt").read_text("utf-8").split()
+    return document(arrays, head)
 
 
 def written(folder: Path, things: dict[str, np.ndarray], lines: list[list[float]] | None = None) -> Path:
@@ -86,9 +58,10 @@ def photons(
 ) -> dict[str, np.ndarray]:
     """Three alike at different places."""
     place = np.array([[-0.31, 0.12], [0.07, -0.33], [0.26, 0.28]])
+    bits = np.rint(65535.0 * np.array(x))
     return {
         "photons.position": place.astype("f4"), "photons.axis_s": np.tile(s, (3, 1)).astype("f2"),
-        "photons.axis_t": np.tile(t, (3, 1)).astype("f2"), "photons.x": np.tile(x, (3, 1)).astype("f4"),
+        "photons.axis_t": np.tile(t, (3, 1)).astype("f2"), "photons.x": np.tile(bits, (3, 1)).astype("u2"),
         "photons.dposition_dn": np.tile([change], (3, 1, 1)).astype("f2"), "photons.light": np.zeros(3, "u1"),
         "photons.throughput": np.tile(carried, (3, 1)).astype("f2"), "photons.lattice": np.zeros(3, "u4"),
     }  # fmt: skip
@@ -110,6 +83,7 @@ def photon_map(things: dict[str, np.ndarray], gain: float, lines: list[list[floa
     u, v = np.meshgrid(centres, centres)
     found = np.zeros((TEXELS, TEXELS, 3))
     given = {name.removeprefix("photons."): values.astype(float) for name, values in things.items()}
+    given["x"] /= 65535.0
     for i, place in enumerate(given["position"]):
         sides = 0.45 * np.stack([given["axis_s"][i], given["axis_t"][i]], axis=1)
         inverse = np.linalg.inv(sides @ sides.T + np.eye(2) * (2.0 / TEXELS) ** 2 / 12.0)
