@@ -1,0 +1,40 @@
+"""The site of a gallery: its list and the documents beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from spectrasplat.base.errors import UserError
+from spectrasplat.commands.gallery import _entries
+from spectrasplat.render.page.site import Card, write_documents, write_index
+
+
+def test_documents_point_to_what_is_in_the_site(tmp_path: Path) -> None:
+    root, site = tmp_path / "project", tmp_path / "site"
+    (root / "docs").mkdir(parents=True)
+    (root / "docs" / "a.svg").write_text("<svg/>")
+    (root / "README.md").write_text("# Name & title\n\n[more](docs/more.md#a-part) [code](app/x.py) [web](https://a.b)")
+    (root / "docs" / "more.md").write_text("# More\n\n## A part\n\n![a](a.svg) [back](../README.md)\n\n|a|\n|-|\n|1|\n")
+    assert write_documents(root, site) == "README.html"
+    first, more = ((site / name).read_text() for name in ("README.html", "docs/more.html"))
+    assert 'href="docs/more.html#a-part"' in first and 'href="https://a.b"' in first and "x.py" not in first
+    assert "<title>Name &amp; title</title>" in first
+    assert 'id="a-part"' in more and 'href="../README.html"' in more and "<td>1</td>" in more
+    assert (site / "docs" / "a.svg").is_file() and 'href="../index.html"' in more
+    assert write_documents(tmp_path / "installed", site) is None
+
+
+def test_what_has_no_page_is_listed_without_a_link(tmp_path: Path) -> None:
+    cards = [Card("A <b>", "", "scenes/a.jpg", "scenes/a.html"), Card("C", "'x' is curved", None, None)]
+    write_index(tmp_path, {"Scenes": cards}, None)
+    text = (tmp_path / "index.html").read_text()
+    assert '<a href="scenes/a.html">' in text and "A &lt;b&gt;" in text
+    assert "&#x27;x&#x27; is curved" in text and text.count("<a ") == 1
+
+
+def test_names_are_those_of_scenes_and_lessons() -> None:
+    assert [entry.page for entry in _entries(["newton", "prism"])] == ["lessons/newton.html", "scenes/prism.html"]
+    assert all(step["set"] and step["text"] for entry in _entries([]) for step in entry.steps)
+    with pytest.raises(UserError, match="did you mean 'prism'"):
+        list(_entries(["prysm"]))
