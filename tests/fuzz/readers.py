@@ -82,6 +82,24 @@ def _gltf() -> Builder:
     return made
 
 
+def _lens(path: Path) -> object:
+    from spectrasplat.model.io.prescription_file import read_prescription
+    from spectrasplat.model.optics.lens_design import lens_table
+
+    return lens_table(read_prescription(path))
+
+
+def _lens_tables() -> tuple[bytes, ...]:
+    shipped = (assets_dir() / "lenses" / "cooke_triplet.csv").read_bytes()
+    return shipped, b"curvature;diameter;thickness;glass\n.1;1;1;1.5/60\n0;1;;\n"
+
+
+def _zemax() -> tuple[bytes, ...]:
+    from tests.unit.test_lenses import ZEMAX
+
+    return ZEMAX.encode(), ZEMAX.replace("ENPD 1.0E+1", "FNUM 5 0").encode("utf-16")
+
+
 def _mesh(path: Path) -> object:
     from spectrasplat.model.scene_objects import load_checked_mesh
 
@@ -437,6 +455,8 @@ def _caches() -> tuple[bytes, ...]:
 
 READERS = {
     "scene": Reader("scene.toml", _scene, _scene_texts),
+    "lens": Reader("lens.csv", _lens, _lens_tables),
+    "zemax": Reader("lens.zmx", _lens, _zemax),
     "gltf": Reader("scene.gltf", _scene, lambda: (_gltf().content(".gltf"),)),
     "glb": Reader("scene.glb", _scene, lambda: (_gltf().content(".glb"),)),
     "obj": Reader("mesh.obj", _mesh, _objs),

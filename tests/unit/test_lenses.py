@@ -198,3 +198,15 @@ def test_what_has_no_figures_is_refused() -> None:
         ss.lens_table("achromat", "crwn")
     with pytest.raises(UserError, match="a beam of diameter 40 does not pass"):
         ss.lens_table(LENSES / "cooke_triplet.csv", beam=40.0)
+
+
+def test_a_table_with_decimal_commas_and_units(tmp_path: Path) -> None:
+    text = "Surface;Radius (mm);Thickness (mm);Glass;Diameter (mm)\n1;22,5;3,25;N-BK7;10\n2;-30,1;0;;10\n"
+    lens = read_prescription(written(tmp_path, text))
+    assert lens.units == "mm" and [s.radius for s in lens.surfaces] == [22.5, -30.1]
+    assert (lens.surfaces[0].thickness, lens.surfaces[0].semi_diameter) == (3.25, 5.0)
+
+
+def test_lengths_beyond_reason_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UserError, match="line 2: a length is beyond 1e[+]09"):
+        read_prescription(written(tmp_path, HEAD + "1e300, 1, N-BK7, 2\n-10, , , 2\n"))

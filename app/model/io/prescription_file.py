@@ -23,11 +23,11 @@ from ..optics.glass import Dispersion
 from ..optics.index_file import find_glass
 from ..optics.lens_design import Lens, Surface, paraxial, widest_beam
 from .curve_file import Row, rows_of
-from .scene_table import MAX_MAGNITUDE
 
 SUFFIXES = (".zmx", ".csv")
 _MAX_BYTES = 4 << 20
 _MOST_SURFACES = 200
+_LONGEST, _MOST_CONIC = 1e9, 1e6
 _COLUMNS = {
     "radius": ("radius", "r", "radiusofcurvature"),
     "curvature": ("curvature", "c"),
@@ -224,7 +224,7 @@ def _lens(path: Path, listed: Sequence[_Listed], makers: Sequence[str], notes: l
     for at, (each, glass) in enumerate(
         zip(listed[first : last + 1], behind[first : last + 1], strict=True), start=first
     ):
-        if each.radius == 0.0 or not abs(1.0 / each.radius) < MAX_MAGNITUDE:
+        if each.radius == 0.0 or math.isnan(each.radius):
             _fail(path, each.line, f"radius is {each.radius:g}; a plane has radius inf")
         if at < last and not (math.isfinite(each.thickness) and each.thickness >= 0.0):
             _fail(path, each.line, f"thickness is {each.thickness:g}; give the distance to the next surface, 0 or more")
@@ -232,8 +232,11 @@ def _lens(path: Path, listed: Sequence[_Listed], makers: Sequence[str], notes: l
             _fail(path, each.line, f"thickness of the {each.glass} is 0; give how thick it is on the axis")
         if not (math.isfinite(each.semi_diameter) and each.semi_diameter > 0.0):
             _fail(path, each.line, f"semi_diameter is {each.semi_diameter:g}; give half the width that light may have")
-        if not math.isfinite(each.conic):
-            _fail(path, each.line, "conic is no finite number; give 0 for a sphere")
+        if not abs(each.conic) < _MOST_CONIC:
+            _fail(path, each.line, f"conic is {each.conic:g}; give a number below {_MOST_CONIC:g}, 0 for a sphere")
+        lengths = (each.semi_diameter, each.thickness if at < last else 0.0, 1.0 / abs(each.radius))
+        if max(lengths) > _LONGEST or _LONGEST**2 < abs(each.radius) < math.inf:
+            _fail(path, each.line, f"a length is beyond {_LONGEST:g} or below its inverse; give it in other units")
         surface = Surface(each.radius, each.thickness if at < last else 0.0, glass, each.semi_diameter, each.conic)
         if np.isnan(surface.sag(np.array([each.semi_diameter]))).any():
             sizes = f"radius {each.radius:g} does not reach a semi_diameter of {each.semi_diameter:g}"

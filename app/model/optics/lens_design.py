@@ -134,6 +134,7 @@ class LensTable:
         )
 
 
+@np.errstate(all="ignore")
 def paraxial(lens: Lens, wavelengths_nm: Sequence[float] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Focal lengths and back focal lengths, float64 (n,): refraction nu' = nu − y(n' − n)/R, transfer y' = y + tu."""
     n = lens.indices(np.asarray(wavelengths_nm, np.float64))
@@ -142,10 +143,10 @@ def paraxial(lens: Lens, wavelengths_nm: Sequence[float] | np.ndarray) -> tuple[
         slope = slope - y * (n[i + 1] - n[i]) * surface.curvature
         if i < last:
             y = y + surface.thickness * slope / n[i + 1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return -1.0 / slope, -y / slope
+    return -1.0 / slope, -y / slope
 
 
+@np.errstate(all="ignore")
 def traced(
     lens: Lens, heights: np.ndarray, wavelengths_nm: Sequence[float] | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -196,6 +197,7 @@ def widest_beam(lens: Lens) -> float:
     return low
 
 
+@np.errstate(all="ignore")
 def lens_table(
     lens: Lens, wavelengths_nm: Sequence[float] | None = None, beam_radius: float | None = None
 ) -> LensTable:
@@ -226,6 +228,5 @@ def lens_table(
         spot = np.sqrt((weights * screen**2).sum(axis=0))
         best = -(weights * screen * slope).sum(axis=0) / (weights * slope**2).sum(axis=0)
         least = np.sqrt((weights * (screen + slope * best) ** 2).sum(axis=0))
-    with np.errstate(invalid="ignore"):
-        columns = np.stack([nm, focal_lengths, back_foci, back_foci - back, spot, best, least])
+    columns = np.stack([nm, focal_lengths, back_foci, back_foci - back, spot, best, least])
     return LensTable(lens, beam, float(focal), float(back), tuple(LensRow(*row) for row in columns.T.tolist()))
