@@ -77,34 +77,16 @@ def test_a_path_knows_nothing_of_its_neighbours(gl: Context, name: str) -> None:
     released(camera_pass)
 
 
-def picture_halting_after(
-    gl: Context, scene: Scene, rounds: int, monkeypatch: pytest.MonkeyPatch
-) -> tuple[np.ndarray, int]:
-    """And how many samples the driver cut short."""
+def picture_halting_after(gl: Context, scene: Scene, rounds: int, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
     monkeypatch.setattr(camera_programs, "HALT_ROUNDS", rounds)
     camera_pass = shuffled(gl, scene)
     [picture] = pictures(camera_pass, scene, 1, 2)
-    cut_short = camera_pass.fallbacks["loops_ended"]
     released(camera_pass)
-    return picture, cut_short
+    return picture
 
 
 @pytest.mark.slow
 def test_where_a_sample_halts_changes_no_bit(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = load_scene(Path("assets/scenes/prism.toml"))
-    rarely, often = (picture_halting_after(gl, scene, rounds, monkeypatch)[0] for rounds in (1 << 14, 1))
+    rarely, often = (picture_halting_after(gl, scene, rounds, monkeypatch) for rounds in (1 << 14, 1))
     np.testing.assert_array_equal(often, rarely)
-
-
-@pytest.mark.slow
-def test_without_halts_the_driver_cuts_samples_short(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The mutant: what the tests above guard against, and that it is counted."""
-    if not gl.is_software:
-        pytest.skip("a GPU ends no loops")
-    scene = load_scene(Path("assets/scenes/wine_glass.toml"))
-    monkeypatch.setattr(camera_programs, "HALT_ROUNDS", 1 << 30)
-    camera_pass = shuffled(gl, scene)
-    first, other = pictures(camera_pass, scene, 2, 2)
-    assert camera_pass.fallbacks["loops_ended"] > 100
-    assert (first != other).any(axis=-1).sum() > 10
-    released(camera_pass)
