@@ -158,10 +158,10 @@ COLUMN = """
     bool first = modes.x > 0.0, second = modes.y > 0.0;
     Uniaxial before = of_kind(Uniaxial(normalize(axis_1), n_1), first),
              behind = of_kind(Uniaxial(normalize(axis_2), n_2), second);
-    vec3 unit = normalize(ray), up = normalize(normal), wave = wave_of_ray(before, unit), way = -up;
-    vec2 part = forward_part(behind, false, wave, length(wave), way);
+    vec3 unit = normalize(ray), up = normalize(normal), wave = wave_of_ray(before, unit);
+    vec2 part = forward_part(behind, false, wave, length(wave), -up);
     passes = float(part.y == 0.0);
-    vec3 turned_wave = wave - dot(wave, way) * way + part.x * way;
+    vec3 turned_wave = wave - (dot(wave, up) + part.x) * up;
     turned = normalize(energy_of_wave(behind, turned_wave));
     vec3 dwave = wave_column(before, of_kind(slopes_1, first), unit, dray);
     dturned = turned_column(behind, of_kind(slopes_2, second), wave, dwave, turned_wave, up, dnormal);

@@ -221,10 +221,7 @@ MUTANTS = {
         "lib/medium.glsl", "/ n_t - n_i", "/ n_t + n_i", f"{_SLAB}[N-BK7-light]"
     ),
     "the sign of entering glass at both faces": Mutant(
-        "lib/medium.glsl",
-        "return index_slope(boundary.before",
-        "return -index_slope(boundary.before",
-        f"{_SLAB}[N-BK7-light]",
+        "lib/medium.glsl", "return index_slope(", "return -index_slope(", f"{_SLAB}[N-BK7-light]"
     ),
     "a film of air between solids that touch": Mutant(
         "lib/intersect.glsl",
