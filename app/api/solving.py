@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.errors import UserError
-from ..render.solving import Fit, Match, Ranked
+from ..edit.solved import Fit, Match, Ranked
 from .arguments import Count, check_scene, settings_of
 from .device import Cancel, Device, Progress
 from .gradient import solved
@@ -49,7 +49,7 @@ def match(
     its first row begins and ends, where its last row begins), world; not needed where `target` is None. Raises
     `UserError`, also where the target says nothing about a glass or `cancel` stopped it.
     """
-    from ..render.solving import glass_called
+    from ..render.light_target import glass_called
 
     check_scene(scene)
     index = glass_called(scene._model, through)
@@ -108,7 +108,7 @@ def _run(
 
 def _values(target: ArrayLike | str | os.PathLike[str]) -> NDArray[np.float64]:
     if isinstance(target, str | os.PathLike):
-        from ..render.solving import read_target
+        from ..render.light_target import read_target
 
         return read_target(Path(target))
     if hasattr(target, "__dlpack__") and not isinstance(target, np.ndarray):

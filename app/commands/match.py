@@ -18,17 +18,17 @@ def match(options: Match) -> int:
     from ..edit.parameters import Stage
     from ..gpu.context import create_context
     from ..gpu.shader import keep_programs
-    from ..render import solving
+    from ..render import light_target, solving
     from ..render.bake import check_receiver
 
     scene = open_scene(options)
     check_receiver(scene, options.receiver)
-    index = solving.glass_called(scene, options.through)
+    index = light_target.glass_called(scene, options.through)
     ends = [options.begin, options.end, options.last]
     between = [place for place in ends if place is not None]
     if between and (options.begin is None or options.end is None):
         raise UserError("--begin and --end go together: give both, where the target's first row begins and ends")
-    values = None if options.target is None else solving.read_target(options.target)
+    values = None if options.target is None else light_target.read_target(options.target)
     note_assumptions(scene)
     settings = settings_for(options, scene)
     started = time.perf_counter()
@@ -43,7 +43,7 @@ def match(options: Match) -> int:
             try:
                 progress(next(work), "comparing glasses")
             except StopIteration as finished:
-                found: solving.Match = finished.value
+                found = finished.value
                 break
             if interrupted():
                 print("spectrasplat: stopped before there was an answer", file=sys.stderr)

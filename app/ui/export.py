@@ -250,7 +250,8 @@ def _bake(
 
 def _matched(context: Context, request: requests.MatchGlass, state: State, thread: ContextThread | None) -> ExportJob:
     """Which glasses come near the light of the scene on its first flat receiver, as a note."""
-    from ..render.solving import flat_receiver, solution
+    from ..render.light_target import flat_receiver
+    from ..render.solving import solution
 
     scene, notices = state.scene, FrameNotices()
     stage, receiver = Stage(scene, scene.camera), flat_receiver(scene)

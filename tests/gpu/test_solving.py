@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import spectrasplat as ss
 from spectrasplat.model.optics import catalogue
-from spectrasplat.render.solving import Target, _at_bins, _errors, _least_squares
+from spectrasplat.render.light_target import Target
+from spectrasplat.render.solving import _at_bins, _errors, _least_squares
 
 EDGES = np.linspace(380.0, 780.0, 17)
 

@@ -1,0 +1,205 @@
+"""Light that is wanted on a receiver: spectra or colours of a line or a field, a picture, or the scene's own light."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..base.errors import UserError, suggestion
+from ..base.files import TABLE_BYTES, read_text, reason_of
+from ..base.image_io import read_image
+from ..edit.parameters import Stage
+from ..gpu.context import Context
+from ..model.scene import Scene
+from ..model.settings import RenderSettings
+from ..passes.plane_frame import plane_frame
+from .bake import placement
+from .frames import FrameRenderer
+
+BINS = 16
+"""Of maps that are compared in colour only."""
+_TEXELS, _FEWEST = 192, 8
+"""Of a map's longer and shorter side."""
+_PARTS = 3
+"""Along a side of one cell of a target, between which its mean is taken."""
+_CELLS, _NARROW = 64, 32.0
+"""Along a side of a target that is the scene as it is; length of a line over the breadth of its strip."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """Light that is wanted on a flat receiver."""
+
+    receiver: str
+    corners: np.ndarray
+    """(3, 3), world: of the first row its beginning and its end, of the last row its beginning."""
+    values: np.ndarray
+    """(h, w, channels), in any unit."""
+    bin_edges_nm: np.ndarray | None = None
+    """(bins + 1,), of even bins from 380 to 780 nm; None: linear Rec.709."""
+
+    def __post_init__(self) -> None:
+        values, edges = self.values, self.bin_edges_nm
+        channels = 3 if edges is None else len(edges) - 1
+        if values.ndim != 3 or values.shape[2] != channels or not values.size or np.shape(self.corners) != (3, 3):
+            raise UserError(
+                f"a target of shape {values.shape} is none: give rows, columns and "
+                f"{channels} {'colours' if edges is None else 'bins'}, and three corners"
+            )
+        if not np.isfinite(values).all() or not np.abs(values).max() > 0.0:
+            raise UserError("the target is dark or not finite: give light that is to be matched")
+
+    @property
+    def bins(self) -> int:
+        """Spectral bins of maps that are compared with it."""
+        return BINS if self.bin_edges_nm is None else len(self.bin_edges_nm) - 1
+
+    @property
+    def window(self) -> np.ndarray:
+        """All four corners."""
+        first, end, last = self.corners
+        return np.stack([first, end, last, end + last - first])
+
+    def settings(self, settings: RenderSettings) -> RenderSettings:
+        """Of the maps."""
+        size = np.linalg.norm(self.corners[1:] - self.corners[0], axis=1)
+        width, height = np.maximum(np.round(_TEXELS * size / size.max()), _FEWEST).astype(int)
+        return replace(
+            settings,
+            layer=f"map:{self.receiver}",
+            bins=self.bins,
+            width=int(width),
+            height=int(height),
+            exposure_ev=None,
+        )
+
+    def seen(self, spectral: np.ndarray, placement: object) -> np.ndarray:
+        """Means over the target's cells (h, w, bins) of a map (H, W, bins) of such a placement."""
+        assert isinstance(placement, dict)
+        origin, right, top = (
+            np.array(placement["corners_world"][k]) for k in ("bottom_left", "bottom_right", "top_left")
+        )
+        h, w, _ = self.values.shape
+        rows, columns = ((np.arange(n * _PARTS) + 0.5) / (n * _PARTS) for n in (h, w))
+        first, end, last = self.corners
+        points = first + columns[None, :, None] * (end - first) + rows[:, None, None] * (last - first) - origin
+        x, y = (
+            points @ (axis / (axis @ axis)) * side - 0.5
+            for axis, side in ((right - origin, spectral.shape[1]), (top - origin, spectral.shape[0]))
+        )
+        found = _between(spectral[::-1].astype(float), x, y)
+        return found.reshape(h, _PARTS, w, _PARTS, -1).mean(axis=(1, 3))
+
+
+def _between(texels: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Texels (H, W, c) at places in texels, bilinear, those at the border going on."""
+    limits = np.array(texels.shape[:2]) - 1
+    x, y = np.clip(x, 0.0, limits[1]), np.clip(y, 0.0, limits[0])
+    i, j = np.minimum(x.astype(int), max(limits[1] - 1, 0)), np.minimum(y.astype(int), max(limits[0] - 1, 0))
+    i1, j1 = np.minimum(i + 1, limits[1]), np.minimum(j + 1, limits[0])
+    u, v = (x - i)[..., None], (y - j)[..., None]
+    low = (1.0 - u) * texels[j, i] + u * texels[j, i1]
+    return (1.0 - v) * low + v * ((1.0 - u) * texels[j1, i] + u * texels[j1, i1])
+
+
+def glass_called(scene: Scene, name: str) -> int:
+    """Index of an object whose glass may be another one. Raises `UserError`."""
+    glasses = [o.name for o in scene.objects if o.material.transmits and not o.material.is_crystal]
+    if name not in glasses:
+        listed = ", ".join(f"'{known}'" for known in glasses) or "none"
+        raise UserError(
+            f"scene '{scene.name}' has no object of glass called '{name}'{suggestion(name, glasses)}; it has {listed}"
+        )
+    return [item.name for item in scene.objects].index(name)
+
+
+def flat_receiver(scene: Scene) -> str:
+    """The first one. Raises `UserError`."""
+    flat = (o.name for o in scene.objects if o.name in scene.receiver_names and o.mesh.is_flat)
+    found = next(flat, None)
+    if found is None:
+        raise UserError(f"scene '{scene.name}' has no flat receiver, on which light could be compared: add a table")
+    return found
+
+
+def line(scene: Scene, receiver: str, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
+    """Corners of a target that is a narrow strip about a line on a receiver."""
+    item = scene.objects[[item.name for item in scene.objects].index(receiver)]
+    axes = plane_frame(item.world_vertices).axes
+    first, last = np.asarray(start, float), np.asarray(end, float)
+    across = np.cross(np.cross(*axes), last - first) / _NARROW
+    return np.stack([first - 0.5 * across, last - 0.5 * across, first + 0.5 * across])
+
+
+def as_it_is(
+    context: Context, stage: Stage, settings: RenderSettings, receiver: str, corners: np.ndarray | None = None
+) -> Generator[float, None, Target]:
+    """The light that the scene casts on a receiver, all of it or what is within `corners`, as a target."""
+    edges = np.linspace(380.0, 780.0, BINS + 1)
+    target = Target(receiver, np.eye(3) if corners is None else corners, np.ones((_CELLS, _CELLS, BINS)), edges)
+    settings, window = target.settings(settings), None if corners is None else target.window
+    if corners is None:
+        settings = replace(settings, width=_TEXELS, height=_TEXELS)
+    renderer = FrameRenderer(context, settings, [stage], window=window)
+    try:
+        yield from renderer.steps(stage)
+        where, spectral = placement(renderer.light), renderer.picture.spectral
+    finally:
+        renderer.release()
+    assert spectral is not None
+    if corners is None:
+        found = where["corners_world"]
+        assert isinstance(found, dict)
+        target = replace(target, corners=np.array([found[k] for k in ("top_left", "top_right", "bottom_left")]))
+    return replace(target, values=target.seen(spectral, where))
+
+
+def wanted(
+    context: Context,
+    stage: Stage,
+    settings: RenderSettings,
+    receiver: str,
+    values: np.ndarray | None,
+    between: Sequence[Sequence[float]] | None,
+) -> Generator[float, None, Target]:
+    """The target of `values` (see `spectrasplat.match`), or the light as it is, on a line or a field of a receiver.
+    Raises `UserError`."""
+    scene = stage.scene
+    if not scene.objects[[item.name for item in scene.objects].index(receiver)].mesh.is_flat:
+        raise UserError(f"'{receiver}' is curved: light is compared on a flat receiver only, so name one")
+    corners = None
+    if between is not None:
+        points = np.asarray(between, float)
+        if points.shape not in ((2, 3), (3, 3)) or not np.isfinite(points).all() or np.ptp(points, axis=0).max() == 0.0:
+            raise UserError("the target's place is given by two ends of a line or three corners, three numbers each")
+        corners = points if len(points) == 3 else line(scene, receiver, *points)
+    if values is None:
+        return (yield from as_it_is(context, stage, settings, receiver, corners))
+    if corners is None:
+        raise UserError("where the target lies is not given: give two ends of a line or three corners, on the receiver")
+    if values.ndim not in (1, 2, 3):
+        raise UserError(
+            f"a target of shape {values.shape} is none: give (bins,), (places, bins) or (rows, columns, bins)"
+        )
+    cells = values.reshape((1,) * (3 - values.ndim) + values.shape)
+    bins = cells.shape[-1]
+    if bins != 3 and not 4 <= bins <= 32:
+        raise UserError(f"a target of {bins} channels is none: give 3 (linear Rec.709) or 4 to 32 spectral bins")
+    return Target(receiver, corners, cells, None if bins == 3 else np.linspace(380.0, 780.0, bins + 1))
+
+
+def read_target(path: Path) -> np.ndarray:
+    """A picture (rows, columns, 3), or lines of numbers from a .csv (places, bins). Raises `UserError`."""
+    if path.suffix.lower() != ".csv":
+        return read_image(path).rgb.astype(float)
+    try:
+        found: np.ndarray = np.atleast_2d(np.loadtxt(io.StringIO(read_text(path, TABLE_BYTES)), delimiter=","))
+    except OSError as error:
+        raise UserError(f"cannot read {path}: {reason_of(error)}") from error
+    except ValueError as error:
+        raise UserError(f"{path}: {error}; give lines of as many numbers each, with commas between") from error
+    return found
