@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -43,6 +44,16 @@ def test_shaders_are_formatted() -> None:
     command = [clang_format.get_executable("clang-format"), "--dry-run", "-Werror", *files]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"run 'clang-format -i' on these\n{done.stderr}"
+
+
+def test_scripts_of_pages_are_clean() -> None:
+    """Oxlint's rules for what is certainly wrong."""
+    oxlint = shutil.which("oxlint", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
+    if oxlint is None:
+        pytest.skip("oxlint is not installed: pip install '.[test]'")
+    command = [oxlint, "--deny", "correctness", "assets/page"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
 
 
 @needs_mypy
