@@ -1,6 +1,7 @@
 // WebGL2: the receiver's map, and pictures of it. One draw adds up the photons, one the beams, one makes the picture.
 
 import { BEAM_FRAGMENT, BEAM_VERTEX, SOLID_FRAGMENT, SOLID_VERTEX, SPLAT_FRAGMENT, SPLAT_VERTEX, VIEW_FRAGMENT, WHOLE_VERTEX } from "./shaders.js";
+import { ABREAST, BEAM, PHOTON } from "./records.js";
 import { SAMPLES } from "./spectra.js";
 import { inverse } from "./views.js";
 
@@ -34,8 +35,12 @@ export class Light {
     this.glass = this.target();
     this.whole = gl.createVertexArray();
     this.counts = { draws: 0, bytes: 0 };
-    this.photons = this.instances(photons, [4, 4, 4, 4, 3, 4]);
-    this.polygons = this.instances(beams, [4, 4, 4, 4, 3]);
+    this.things = [[this.splats, photons, PHOTON], [this.beams, beams, BEAM]].filter(([, { count }]) => count).map(([kind, { rows, count }, floats]) => {
+      const records = this.texture();
+      this.fill(records, (ABREAST * floats) / 4, Math.ceil(count / ABREAST), rows);
+      return { kind, records, count };
+    });
+    this.quads = this.corners(Math.max(photons.count, beams.count));
     if (beams.count) this.fill(this.edges, 1024, beams.edges.length / 4096, beams.edges);
     this.meshes = this.solids(head, array);
   }
@@ -95,19 +100,14 @@ export class Light {
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
   }
 
-  instances({ rows, count }, sizes) {
-    const { gl } = this, vertices = gl.createVertexArray(), stride = 4 * sizes.reduce((a, b) => a + b, 0);
+  // Two triangles each, of four corners; instances of so few are slow on many a device.
+  corners(count) {
+    const { gl } = this, vertices = gl.createVertexArray(), list = new Uint32Array(6 * count);
+    for (let i = 0; i < list.length; i++) list[i] = 4 * Math.floor(i / 6) + [0, 1, 2, 2, 1, 3][i % 6];
     gl.bindVertexArray(vertices);
-    gl.bindBuffer(gl.ARRAY_BUFFER, gl.createBuffer());
-    gl.bufferData(gl.ARRAY_BUFFER, rows, gl.STATIC_DRAW);
-    let offset = 0;
-    sizes.forEach((size, place) => {
-      gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, size, gl.FLOAT, false, stride, offset);
-      gl.vertexAttribDivisor(place, 1);
-      offset += 4 * size;
-    });
-    return { vertices, count };
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, list, gl.STATIC_DRAW);
+    return vertices;
   }
 
   solids(head, array) {
@@ -167,15 +167,13 @@ export class Light {
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE);
-    const tables = { paths: this.paths, light: this.light };
-    for (const [kind, things] of [[this.splats, this.photons], [this.beams, this.polygons]]) {
-      if (!things.count) continue;
-      this.use(kind, kind === this.beams ? { ...tables, edges: this.edges } : tables);
+    gl.bindVertexArray(this.quads);
+    for (const { kind, records, count } of this.things) {
+      this.use(kind, { records, paths: this.paths, light: this.light, edges: this.edges });
       gl.uniform2f(kind.at("support"), ...this.tables.support);
       gl.uniform1i(kind.at("lines"), this.tables.lineCount);
       if (kind === this.splats) gl.uniform1f(kind.at("smoothing"), head.photons.smoothing);
-      gl.bindVertexArray(things.vertices);
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, things.count);
+      gl.drawElements(gl.TRIANGLES, 6 * count, gl.UNSIGNED_INT, 0);
       this.counts.draws++;
     }
     gl.disable(gl.BLEND);

@@ -1,5 +1,6 @@
 // The spectrum of the light at one place of the receiver, from the photons and beams themselves, without the map.
 
+import { BEAM, PHOTON } from "./records.js";
 import { COUNT, FIRST_NM, SAMPLES, valueAt } from "./spectra.js";
 
 const STEP_NM = 10;
@@ -31,7 +32,7 @@ export function spectrumAt([u, v], { head, photons, beams, paths, rows, x, texel
 function addPhotons(found, power, { rows, count }, paths, smoothing, texel, u, v) {
   const index = (row, x, g) => paths[4 * (SAMPLES * row + Math.round(x * (SAMPLES - 1))) + g];
   for (let i = 0; i < count; i++) {
-    const r = rows.subarray(23 * i, 23 * i + 23), [sx, sy, tx, ty] = [r[4], r[5], r[6], r[7]].map((side) => side * smoothing);
+    const r = rows.subarray(PHOTON * i, PHOTON * i + PHOTON), [sx, sy, tx, ty] = [r[4], r[5], r[6], r[7]].map((side) => side * smoothing);
     const shift = (x) => {
       const [a, b, c] = [0, 1, 2].map((g) => index(0, x, g) - index(1, r[13], g));
       return [r[0] + a * r[8] + b * r[10] + c * r[2], r[1] + a * r[9] + b * r[11] + c * r[3]];
@@ -52,7 +53,7 @@ function addPhotons(found, power, { rows, count }, paths, smoothing, texel, u, v
 
 function addBeams(found, power, { rows, count, edges }, u, v) {
   for (let i = 0; i < count; i++) {
-    const r = rows.subarray(19 * i, 19 * i + 19), du = u - r[0], dv = v - r[1], reach = Math.hypot(r[2], r[3]);
+    const r = rows.subarray(BEAM * i, BEAM * i + BEAM), du = u - r[0], dv = v - r[1], reach = Math.hypot(r[2], r[3]);
     if (Math.abs(du * r[2] + dv * r[3]) > reach * reach * 1.001 || Math.abs(dv * r[2] - du * r[3]) > reach * r[4] * 1.001) continue;
     found.forEach((bin, k) => {
       if (bin.x < r[16] || bin.x >= r[17]) return;

@@ -1,14 +1,17 @@
-// Photons and beams as the shaders take them: a row of floats each.
+// Photons and beams as the shaders take them: some texels of four floats each, 256 photons or beams a row of a texture.
 
-// Rows of 23: place, change with the third index; sides; change with two indices; x and row; throughput; waves.
+export const PHOTON = 24, BEAM = 20, ABREAST = 256;
+const table = (count, floats) => new Float32Array(floats * ABREAST * Math.ceil(count / ABREAST));
+
+// Place, change with the third index; sides; change with two indices; x and row; throughput, 0; waves.
 export function photonRows(head, array, shapeOf) {
-  const count = shapeOf("photons.position")[0], rows = new Float32Array(23 * count);
+  const count = shapeOf("photons.position")[0], rows = table(count, PHOTON);
   if (!count) return { rows, count };
   const [position, s, t, change, x, throughput, light, lattice] =
     ["position", "axis_s", "axis_t", "dposition_dn", "x", "throughput", "light", "lattice"].map((name) => array(`photons.${name}`));
   const groups = change.length / (2 * count), unit = head.photons.unit ?? 1, known = new Map();
   for (let i = 0; i < count; i++) {
-    const at = 23 * i;
+    const at = PHOTON * i;
     rows.set([position[2 * i], position[2 * i + 1]], at);
     rows.set([s[2 * i], s[2 * i + 1], t[2 * i], t[2 * i + 1]], at + 4);
     for (let g = 0; g < Math.min(groups, 3); g++)
@@ -22,16 +25,16 @@ export function photonRows(head, array, shapeOf) {
     const area = s[2 * i] * t[2 * i + 1] - s[2 * i + 1] * t[2 * i];
     if (Math.abs(area) < 1e-30) continue;
     known.get(points).forEach(([p, q], k) => {
-      rows[at + 19 + 2 * k] = (p * t[2 * i + 1] - q * s[2 * i + 1]) / area;
-      rows[at + 20 + 2 * k] = (q * s[2 * i] - p * t[2 * i]) / area;
+      rows[at + 20 + 2 * k] = (p * t[2 * i + 1] - q * s[2 * i + 1]) / area;
+      rows[at + 21 + 2 * k] = (q * s[2 * i] - p * t[2 * i]) / area;
     });
   }
   return { rows, count };
 }
 
-// Rows of 19: a rectangle that holds the polygon; edges and row; density; slope; x and least penumbra. Edges about its middle, two texels each.
+// A rectangle that holds the polygon; edges and row; density; slope; x and least penumbra, 0. Edges about its middle, two texels each.
 export function beamRows(array) {
-  const x = array("beams.x"), count = x ? x.length / 2 : 0, rows = new Float32Array(19 * count);
+  const x = array("beams.x"), count = x ? x.length / 2 : 0, rows = table(count, BEAM);
   if (!count) return { rows, count, edges: new Float32Array(0) };
   const [density, slope, centre, light, first, edge, hullFirst, hull] =
     ["density", "slope", "centre", "light", "first", "edge", "hull_first", "hull"].map((name) => array(`beams.${name}`));
@@ -39,11 +42,11 @@ export function beamRows(array) {
   for (let i = 0; i < count; i++) {
     const { middle, along, half } = rectangle(hull, hullFirst[i], hullFirst[i + 1]), [a, b, c] = density.subarray(3 * i);
     rows.set([...middle, along[0] * half[0], along[1] * half[0], half[1], first[i], first[i + 1] - first[i], light?.[i] ?? 0,
-      a, 4 * b - 3 * a - c, 2 * (a - 2 * b + c), 0, slope[2 * i], slope[2 * i + 1], centre[2 * i], centre[2 * i + 1], x[2 * i], x[2 * i + 1]], 19 * i);
+      a, 4 * b - 3 * a - c, 2 * (a - 2 * b + c), 0, slope[2 * i], slope[2 * i + 1], centre[2 * i], centre[2 * i + 1], x[2 * i], x[2 * i + 1]], BEAM * i);
     // Of a polygon narrower than its penumbrae only their mean is seen: all its edges are as soft.
     const softness = Array.from(edge.subarray(8 * first[i], 8 * first[i + 1])).filter((_, k) => k % 4 === 3).map((soft) => Math.max(soft, 0));
     const widest = Math.max(...softness), isNarrow = Math.sqrt(4 * half[0] * half[1]) < 4 * widest;
-    rows[19 * i + 18] = isNarrow ? widest : Math.min(...softness);
+    rows[BEAM * i + 18] = isNarrow ? widest : Math.min(...softness);
     for (let e = first[i]; e < first[i + 1]; e++) {
       const line = edge.subarray(8 * e, 8 * e + 8);
       const scale = 2 / (Math.hypot(line[0], line[1]) + Math.hypot(line[4], line[5]));

@@ -38,6 +38,13 @@ vec3 energy_below(int row, float x) {
 vec4 line_of(int row, int k) { return texelFetch(light, ivec2(SAMPLES + k, row), 0); }
 `;
 
+// Two triangles of four vertices for each record of so many texels.
+const RECORDS = (texels) => `
+uniform sampler2D records;
+vec4 record(int k) { return texelFetch(records, ivec2(${texels} * ((gl_VertexID >> 2) & 255) + k, gl_VertexID >> 10), 0); }
+vec2 corner() { return vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1) * 2.0 - 1.0; }
+`;
+
 const GAUSSIAN = `
 const float SQRT_HALF = 0.70710678, TWO_PI = 6.2831853;
 // To 3e-7 (Abramowitz and Stegun 1964, 7.1.28).
@@ -53,14 +60,11 @@ float below_normal(float z) { return 0.5 + 0.5 * error_function(clamp(z, -8.0, 8
 float excess(float z) { return normal(z) - z * (1.0 - below_normal(z)); }
 `;
 
-export const SPLAT_VERTEX = COMMON + TABLES + GAUSSIAN + `
+export const SPLAT_VERTEX = COMMON + TABLES + RECORDS(6) + GAUSSIAN + `
 uniform float smoothing;
-layout(location = 0) in vec4 place_v2;  // where the anchor lands; change with the third index
-layout(location = 1) in vec4 sides;     // of a lattice cell
-layout(location = 2) in vec4 v01;       // change with the first and the second index
-layout(location = 3) in vec4 span;      // x: from, anchor, to; row of the light's table
-layout(location = 4) in vec3 carried;   // throughput there
-layout(location = 5) in vec4 waves;     // the lattice's two lowest frequencies, cycles a unit
+vec4 place_v2;  // where the anchor lands; change with the third index
+vec4 v01;       // change with the first and the second index
+vec4 span;      // x: from, anchor, to; row of the light's table
 flat out vec4 band;       // x: from, anchor, to; standard deviation
 flat out vec4 weights;    // throughput at the anchor, its slopes below and above; bend of the sweep
 flat out vec4 shape;      // half a texel across; 0; 1 / standard deviation along; row
@@ -93,6 +97,9 @@ float kept(float edge, float wide, float s) {
 }
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  place_v2 = record(0); v01 = record(2); span = record(3);
+  // Sides of a lattice cell; throughput from, at the anchor, to; the lattice's two lowest frequencies, cycles a unit.
+  vec4 sides = record(1), carried = record(4), waves = record(5);
   float x_lo = max(span.x, support.x), x_hi = min(span.z, support.y);
   if (x_hi <= x_lo) return;
   vec2 to_lo = shift_to(x_lo), to_hi = shift_to(x_hi);
@@ -153,7 +160,7 @@ void main() {
   }
   float amplitude = 1.0
     / (box * kept(edge, box, root) * kept(reach, sweep, sigma) * clamp(grid, 0.7, 1.4));
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  vec2 corner = corner();
   // Splats about a lattice's points add up to 1 and a ripple, which each takes off.
   ripple = vec3(0.0);
   at.zw = vec2(0.0);
@@ -234,19 +241,17 @@ void main() {
   deposited = vec4(share * sum, 0.0);
 }`;
 
-export const BEAM_VERTEX = COMMON + TABLES + `
-layout(location = 0) in vec4 quad;      // middle, half of its long side
-layout(location = 1) in vec4 more;      // half of its short side (length), first edge, edges, row
-layout(location = 2) in vec4 density;   // 1, t, t²; 0
-layout(location = 3) in vec4 slope;     // relative, per unit; about
-layout(location = 4) in vec3 span;      // x: from, to; least penumbra, units
+export const BEAM_VERTEX = COMMON + TABLES + RECORDS(5) + `
 flat out vec4 parabola, tilt, band;
 flat out vec3 about;
 flat out ivec3 list;
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
+  vec4 quad = record(0);     // middle, half of its long side
+  vec4 more = record(1);     // half of its short side (length), first edge, edges, row
+  vec4 span = record(4);     // x: from, to; least penumbra, units; 0
   if (span.y <= support.x || span.x >= support.y) return;
-  vec2 corner = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2.0 - 1.0;
+  vec2 corner = corner();
   float reach = length(quad.zw);
   vec2 e = reach > 0.0 ? quad.zw / reach : vec2(1.0, 0.0);
   vec2 right = e * reach, up = vec2(-e.y, e.x) * more.x;
@@ -261,8 +266,8 @@ void main() {
   across = normalize(across);
   float spread = max(abs(along.x * across.y - along.y * across.x), 0.1);
   vec2 margin = 0.75 * (corner.x * along + corner.y * across) / spread;
-  parabola = density;
-  tilt = slope;
+  parabola = record(2);  // 1, t, t²; 0
+  tilt = record(3);      // relative, per unit; about
   band = vec4(span.xy, 0.0, 0.0);
   // Soft ones in texels as coarse as a quarter of their penumbrae.
   float soft = span.z / sqrt(texel_area(middle.xy / middle.z));

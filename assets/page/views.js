@@ -1,6 +1,8 @@
 // Where the eye is, and which place of the receiver each pixel shows: 3 x 3 matrices, by rows, from (pixel right, pixel
 // down, 1) to (u, v, 1) times a weight.
 
+import { BEAM, PHOTON } from "./records.js";
+
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const plus = (a, b, k) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
@@ -62,8 +64,8 @@ export function extent({ photons, beams }, w) {
   const each = ({ rows, count }, width, add) => {
     for (let i = 0, step = Math.ceil(count / 3000); i < count; i += step) add(rows.subarray(width * i, width * i + width));
   };
-  each(photons, 23, (r) => places.push([r[0], r[1], r[17]]));
-  each(beams, 19, (r) => [-1, 1].forEach((k) => places.push([r[0] + k * r[2], r[1] + k * r[3], r[8] * r[4] * Math.hypot(r[2], r[3])])));
+  each(photons, PHOTON, (r) => places.push([r[0], r[1], r[17]]));
+  each(beams, BEAM, (r) => [-1, 1].forEach((k) => places.push([r[0] + k * r[2], r[1] + k * r[3], r[8] * r[4] * Math.hypot(r[2], r[3])])));
   const total = places.reduce((sum, place) => sum + place[2], 0);
   const ends = (axis, from, to) => {
     let below = 0, low = null, high = from;
