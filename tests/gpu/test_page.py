@@ -27,7 +27,7 @@ from spectrasplat.passes.plane_frame import plane_frame
 from spectrasplat.passes.texel_map import TexelMap
 from spectrasplat.render.export_caustic import check_export
 from spectrasplat.render.frame_fit import inputs_of
-from spectrasplat.render.page.light import PageLight, page_light
+from spectrasplat.render.page.light import PageLight, beams_alone, page_light
 from spectrasplat.render.page.page import check_page, check_page_path, decimated
 from spectrasplat.render.page.spectra import Glasses
 from spectrasplat.render.viewer.engine import LiveEngine
@@ -92,6 +92,8 @@ def errors(
 
         show(glasses.widened(model))
         assert engine.live_light is not None
+        for _ in beams_alone(engine.live_light, photons):
+            pass
         page: PageLight = page_light(engine.live_light, 0, glasses)
         for glass in shown(glasses):
             show(through(model, glasses.own, glass))

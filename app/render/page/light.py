@@ -6,6 +6,7 @@ where depends on the index alone, and another dispersion moves wavelengths along
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +27,11 @@ if TYPE_CHECKING:
 _LIT = 0.998
 """Share of the light that a page's window holds."""
 _MOST = 6e4
-"""Of columns: what half floats hold. More is a numerical accident."""
+"""Of columns: what half floats hold. Longer ones are shortened; where one is no number, light falls on a point."""
+_FINER_BEAMS = 4.0
+"""Times as many photons whose time beams may take where they carry all light."""
+_MOST_EDGES = 140_000
+"""Of polygons: 8 MB on a page, about."""
 _MARGIN = 0.04
 """Of the window's side, round it."""
 
@@ -87,6 +92,18 @@ def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
     return PageLight(arrays, head, frame, item)
 
 
+def beams_alone(light: LiveLight, photons: int) -> Iterator[None]:
+    """Find the beams again: all of them, as weak ones that photons carried on are not stored; more where no photons
+    are, but no more than a page has room for."""
+    found, finer = light.light_pass.survey, _FINER_BEAMS if light.only_beams else 1.0
+    while found.beams is not None:
+        yield from light.light_pass.beam_steps_again(finer * photons)
+        polygons = found.beams.found.polygons if found.beams.found is not None else None
+        if finer <= 1.0 or polygons is None or len(polygons.edges) <= _MOST_EDGES:
+            return
+        finer *= 0.5
+
+
 def landed(light: LiveLight, receiver: int) -> float:
     """Light that lands on a receiver, about, by photons and polygons."""
     beams, weights = light.light_pass.survey.beams, light.buffers.light_power
@@ -109,16 +126,15 @@ def _photons(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -
     scale, groups = light.buffers.space.scale, light.buffers.groups.count
     weight = 1.0 if stored is None else stored.pass_photons * stored.store.rounds / stored.store.rounds_of_pass
 
-    def along(name: str) -> np.ndarray:
-        columns = records[name][:, :3].astype(float) @ frame.axes.T / scale
-        return np.clip(columns, -_MOST, _MOST).astype("f2")
-
-    columns = [along(f"dposition_dvar{g}") for g in range(groups)]
+    names = ["dposition_ds", "dposition_dt", *(f"dposition_dvar{g}" for g in range(groups))]
+    columns = np.stack([records[name][:, :3].astype(float) @ frame.axes.T / scale for name in names], axis=1)
+    columns[~np.isfinite(columns).all(axis=(1, 2))] = 0.0
+    columns *= _MOST / np.maximum(np.abs(columns).max(axis=2, keepdims=True), _MOST)
     return {
         "position": (frame.project(records["position"].astype(float)) / scale).astype("f4"),
-        "axis_s": along("dposition_ds"),
-        "axis_t": along("dposition_dt"),
-        "dposition_dn": np.stack(columns, axis=1) if columns else np.zeros((len(records), 0, 2), "f2"),
+        "axis_s": columns[:, 0].astype("f2"),
+        "axis_t": columns[:, 1].astype("f2"),
+        "dposition_dn": columns[:, 2:].astype("f2"),
         "x": to_page(np.stack([records[name] for name in ("x_lo", "x_anchor", "x_hi")], axis=1)),
         "throughput": records["throughput"].astype(float) / max(weight, 1e-300),
         "light": (records["light_and_source"] & 255).astype("u1"),

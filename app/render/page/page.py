@@ -20,6 +20,7 @@ from ...base.image_io import shown_bytes
 from ...base.tone_map import auto_exposure
 from ...base.version import __version__
 from ...edit.parameters import Stage
+from ...features.facts import dispersive_glasses
 from ...gpu.context import Context
 from ...model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, xyz_to_rgb709
 from ...model.optics.spectrum import Spectrum
@@ -31,7 +32,7 @@ from ..frames import FrameRenderer
 from ..lit_receiver import up_of
 from ..viewer.still_engine import finishing, still_engine
 from .document import document
-from .light import landed, page_light
+from .light import beams_alone, landed, page_light
 from .picture import page_picture, pixels_to_plane, seen_window, weight_of
 from .spectra import GAIN_MAX, Glasses, offered_spectra
 
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 DEFAULT_PHOTONS = 100_000
 DEFAULT_WIDTH = 720
 """Pixels."""
+MOST_GROUPS = 3
+"""Glasses by whose indices a page's photons move, each by its own."""
 MOST_TRIANGLES = 6000
 """Of all that is drawn of the scene's objects."""
 _STAYS = (
@@ -144,7 +147,8 @@ def page_steps(
     glasses = Glasses.of(scene)
     settings = replace(settings, photons=settings.photons or DEFAULT_PHOTONS)
     if glasses.own is None:  # beams have no columns by which another glass moves them
-        settings = replace(settings, method="srd-photons")
+        alone = len(dispersive_glasses(scene)) <= MOST_GROUPS
+        settings = replace(settings, method="srd-photons" if alone else "srd-lambda")
     engine = still_engine(context, replace(settings, spp=1), exact=False)
     try:
         engine.set(inputs_of(Stage(glasses.widened(scene), stage.camera), settings))
@@ -152,6 +156,8 @@ def page_steps(
             yield _LIGHT_SHARE * share
         live = engine.live_light
         assert live is not None
+        for _ in beams_alone(live, settings.photons or 1):
+            yield _LIGHT_SHARE
         light = page_light(live, _receiver(live, receiver), glasses)
         groups = _groups(live, glasses)
         size = settings.width, settings.height
@@ -218,12 +224,14 @@ class _Part:
 
 
 def _groups(live: LiveLight, glasses: Glasses) -> _Part:
-    """Glasses whose dispersion may be edited, and what may be shown instead of each."""
+    """Glasses whose dispersion may be edited, and what may be shown instead of each. None beside crystals, whose two
+    indices go together, and gratings, which have none."""
     groups, traced = live.buffers.groups, live.light_pass.scene
     rows: list[np.ndarray] = []
     listed: list[dict[str, Any]] = []
     edited: list[dict[str, Any]] = []
     alone = groups.count == len(groups.glasses) and not groups.by_wavelength
+    alone &= not any(m.is_grating or m.extraordinary is not None for m in (item.material for item in traced.objects))
     for g in range(groups.count if alone else 0):
         own = glasses.own or groups.glasses[g]
         choices = [own, *glasses.others]
