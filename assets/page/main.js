@@ -9,7 +9,7 @@ import { beamRows, photonRows } from "./records.js";
 import { asBright, COUNT, indexOf, indexTable, lightTable, placesOf, single } from "./spectra.js";
 import { areaAt, around, extent, fromAbove, fromCamera, startAbove, startAround, uvAt } from "./views.js";
 
-const SLOW_MS = 45, SETTLED_MS = 180, MODES = { camera: 0, above: 1, space: 2 };
+const SLOW_MS = 45, FAST_MS = 25, SETTLED_MS = 180, COARSEST = 4, MODES = { camera: 0, above: 1, space: 2 };
 
 function problem(text) {
   byId("problem").textContent = text;
@@ -40,7 +40,9 @@ async function start() {
   const state = fresh(), canvas = byId("picture"), shown = { index: [], own: [], rows: [], x: null, paths: null };
   const dirty = { tables: true, map: true, glass: true, spectrum: true, words: true };
   const times = { first: 0, frames: [] };
-  let light = null, queued = false, coarse = false, settle = 0, lastFrame = 0, toUv = null;
+  let light = null, queued = false, settle = 0, lastFrame = 0, toUv = null;
+  // While something moves the map has every so many pixels only, as many as keep pace; all of them once it rests.
+  let moves = true, coarse = COARSEST, finest = 1;
 
   // ---- one frame ------------------------------------------------------------------------------
 
@@ -82,32 +84,40 @@ async function start() {
       if (dirty.glass) light.drawGlass(camera, width, height);
       dirty.glass = false;
     }
-    if (dirty.map) light.gather(toUv, width, height, coarse ? 2 : 1);
+    if (dirty.map) light.gather(toUv, width, height, moves ? coarse : 1);
     light.show(MODES[state.view], (head.exposure_ev ?? 0) + state.exposure, markPixel(), width, height);
     if (dirty.words) tell(state, shown.index);
     if (dirty.words && shown.index.length) {
       drawIndex(byId("index"), shown.index[0], shown.own[0], state.readNm, colours);
       tellIndex(state, shown.index[0], shown.own[0]);
     }
-    if (dirty.spectrum && !coarse) spectrum();
+    if (dirty.spectrum && (!moves || coarse === 1)) spectrum();
     const isMoving = dirty.map;
     dirty.tables = dirty.map = dirty.words = false;
     if (lastFrame && isMoving) {
-      times.frames.push(now - lastFrame);
-      // Half the texels while something is dragged, where whole ones are slow.
-      if (times.frames.slice(-3).filter((ms) => ms > SLOW_MS && ms < 2000).length === 3) coarse = true;
+      times.frames = [...times.frames.slice(-2), now - lastFrame];
+      const isAll = (test) => times.frames.length === 3 && times.frames.every(test), before = coarse;
+      if (isAll((ms) => ms > SLOW_MS)) finest = coarse = Math.min(2 * coarse, COARSEST);
+      else if (isAll((ms) => ms < FAST_MS)) coarse = Math.max(coarse / 2, finest);
+      if (coarse !== before) times.frames = [];
     }
     lastFrame = state.playing || isMoving ? now : 0;
     clearTimeout(settle);
     if (state.playing) queue();
-    else settle = setTimeout(settled, SETTLED_MS);
+    else settle = setTimeout(settled, Math.max(SETTLED_MS, 3 * (times.frames.at(-1) ?? 0)));
+  }
+
+  function whole() {
+    moves = false;
+    dirty.map = true;
+    frame(performance.now());
   }
 
   function settled() {
     lastFrame = 0;
-    if (!coarse && !dirty.spectrum) return;
-    if (coarse) dirty.map = true;
-    coarse = false;
+    if (!moves) return;
+    moves = false;
+    dirty.map = coarse > 1;
     queue();
   }
 
@@ -120,7 +130,7 @@ async function start() {
   function play(now) {
     if (state.playing === "gain") state.gain = (head.limits?.gain_max ?? 2) * (0.5 - 0.5 * Math.cos(now / 1400));
     if (state.playing === "nm") Object.assign(state, { nm: 400 + ((now / 20) % 300), isSingle: true });
-    if (state.playing) dirty.tables = dirty.map = dirty.spectrum = dirty.words = true;
+    if (state.playing) moves = dirty.tables = dirty.map = dirty.spectrum = dirty.words = true;
   }
 
   // ---- the place under the finger ----------------------------------------------------------------
@@ -164,6 +174,7 @@ async function start() {
     const isSeen = ["space", "view", "above"].some((name) => names.includes(name));
     dirty.glass ||= isSeen;
     dirty.map ||= isSeen;
+    moves ||= isLight || isSeen;
     dirty.spectrum ||= isLight || names.includes("mark") || names.includes("readNm");
     queue();
   }
@@ -189,7 +200,7 @@ async function start() {
       dirty.spectrum = true;
     },
     save: () => {
-      frame(performance.now());
+      whole();
       canvas.toBlob((blob) => {
         const link = document.createElement("a");
         link.href = URL.createObjectURL(blob);
@@ -287,7 +298,7 @@ async function start() {
   new ResizeObserver(() => set({})).observe(canvas);
   if (light) frame(performance.now());
   times.first = performance.now();
-  window.spectrasplat = { state, set, times, head, get light() { return light; }, frame: () => frame(performance.now()) };
+  window.spectrasplat = { state, set, times, head, get light() { return light; }, frame: whole };
 }
 
 start().catch((error) => {

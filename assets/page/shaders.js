@@ -60,6 +60,22 @@ float below_normal(float z) { return 0.5 + 0.5 * error_function(clamp(z, -8.0, 8
 float excess(float z) { return normal(z) - z * (1.0 - below_normal(z)); }
 `;
 
+const SWEPT = `
+// Where in the band, 0 to 1, what lands a share of the way along the sweep is.
+float in_band(float way) {
+  if (!BENT || abs(weights.w) < 1e-3) return way;
+  float c = weights.w, b = 1.0 + c, root = b * b - 4.0 * c * clamp(way, 0.0, 1.0);
+  return (b - sqrt(max(root, 0.0))) / (2.0 * c);
+}
+float way_to(float x) {
+  float f = (x - band.x) / (band.z - band.x);
+  return BENT ? f + weights.w * f * (1.0 - f) : f;
+}
+float carried_at(float x) {
+  return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0);
+}
+`;
+
 export const SPLAT_VERTEX = COMMON + TABLES + RECORDS(6) + GAUSSIAN + `
 uniform float smoothing;
 vec4 place_v2;  // where the anchor lands; change with the third index
@@ -67,11 +83,12 @@ vec4 v01;       // change with the first and the second index
 vec4 span;      // x: from, anchor, to; row of the light's table
 flat out vec4 band;       // x: from, anchor, to; standard deviation
 flat out vec4 weights;    // throughput at the anchor, its slopes below and above; bend of the sweep
-flat out vec4 shape;      // half a texel across; 0; 1 / standard deviation along; row
+flat out vec4 shape;      // half a texel across; 1 if the sweep is short; 1 / standard deviation along; row
 flat out vec3 ripple;
+flat out vec3 moments[4]; // of a short sweep's light about its middle, in standard deviations, each over its factorial
 flat out vec4 rect;
 out vec4 at;              // across, along (0 to 1), cycles
-
+` + SWEPT + `
 const float TEXEL = 1.0 / 12.0;
 vec2 shift_to(float x) {
   float place = clamp(x, 0.0, 1.0) * float(SAMPLES - 1);
@@ -94,6 +111,12 @@ float damping(vec2 k, float swept) {
 }
 float kept(float edge, float wide, float s) {
   return 1.0 - 2.0 * s / wide * (excess((edge - 0.5 * wide) / s) - excess((edge + 0.5 * wide) / s));
+}
+void add_moments(vec3 light, float at, float variance) {
+  moments[0] += light;
+  moments[1] += at * light;
+  moments[2] += 0.5 * (at * at + variance) * light;
+  moments[3] += at * (at * at + 3.0 * variance) / 6.0 * light;
 }
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
@@ -154,7 +177,7 @@ void main() {
   vec2 long_side = e * reach, short_side = (m + shear * e) * edge;
   // The texels' centres see some of its harmonics too (Poisson).
   float grid = 1.0;
-  for (int i = 0; i < 4; ++i) {
+  for (int i = 0; i < 4 && min(across2, along2) < 0.5; ++i) {
     vec2 k = i == 0 ? vec2(1, 0) : i == 1 ? vec2(0, 1) : i == 2 ? vec2(1, 1) : vec2(1, -1);
     grid += 2.0 * damping(k, sweep) * cos(TWO_PI * dot(k, centre - 0.5));
   }
@@ -187,7 +210,25 @@ void main() {
   weights = amplitude * vec4(carried.y, (carried.y - carried.x) / max(span.y - span.x, 1e-6),
     (carried.z - carried.y) / max(span.z - span.y, 1e-6), 0.0);
   weights.w = bend;
-  shape = vec4(0.5 * box * SQRT_HALF / root, 0.0, 1.0 / sigma, span.w);
+  shape = vec4(0.5 * box * SQRT_HALF / root, sweep < 1.2 * sigma, 1.0 / sigma, span.w);
+  for (int i = 0; i < 4; ++i) moments[i] = vec3(0.0);
+  if (shape.y > 0.0) {
+    const int PARTS = 4;
+    int row = int(span.w);
+    float unit = sweep / sigma, wide = unit / float(PARTS), x_from = x_lo;
+    vec3 before = energy_below(row, x_lo);
+    for (int i = 0; i < PARTS; ++i) {
+      float x = mix(x_lo, x_hi, in_band(float(i + 1) / float(PARTS)));
+      vec3 now = energy_below(row, x);
+      add_moments((now - before) * carried_at(0.5 * (x_from + x)), (float(i) + 0.5) * wide - 0.5 * unit, wide * wide / 12.0);
+      before = now;
+      x_from = x;
+    }
+    for (int k = 0; k < lines; ++k) {
+      vec4 line = line_of(row, k);
+      if (line.w >= x_lo && line.w < x_hi) add_moments(line.rgb * carried_at(line.w), unit * (way_to(line.w) - 0.5), 0.0);
+    }
+  }
   rect = rect_of(level);
   fan *= min(1.0, 0.8 / max(abs(dot(fan, long_side)) + abs(dot(fan, short_side)), 1e-9));
   vec2 beside = corner.x * long_side + corner.y * short_side;
@@ -197,24 +238,22 @@ void main() {
 
 export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + `
 flat in vec4 band, weights, shape, rect;
-flat in vec3 ripple;
+flat in vec3 ripple, moments[4];
 in vec4 at;
 out vec4 deposited;
-// Where in the band, 0 to 1, what lands a share of the way along the sweep is.
-float in_band(float way) {
-  if (!BENT || abs(weights.w) < 1e-3) return way;
-  float c = weights.w, b = 1.0 + c, root = b * b - 4.0 * c * clamp(way, 0.0, 1.0);
-  return (b - sqrt(max(root, 0.0))) / (2.0 * c);
-}
-float carried_at(float x) {
-  return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0);
-}
-void main() {
+` + SWEPT + `void main() {
   if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
   float w = 1.0 / gl_FragCoord.w;
   float share = w * w * 0.5 * (error_function(min(at.x + w * shape.x, 6.0)) - error_function(max(at.x - w * shape.x, -6.0)));
   vec3 away = abs(fract(vec3(at.zw, at.z + at.w)) * 2.0 - 1.0);
   share *= 1.0 - dot(ripple, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);
+  float z = (at.y - 0.5) / band.w;
+  if (shape.y > 0.0) {
+    // By Hermite's polynomials.
+    vec3 sum = moments[0] + z * moments[1] + (z * z - 1.0) * moments[2] + z * (z * z - 3.0) * moments[3];
+    deposited = vec4(share * shape.z * normal(z) * sum, 0.0);
+    return;
+  }
   int row = int(shape.w);
   // What lands within three standard deviations, in parts: their light times a normal density at their middles, less
   // wide by what a part's own width adds.
@@ -234,9 +273,7 @@ void main() {
   for (int k = 0; k < lines; ++k) {
     vec4 line = line_of(row, k);
     if (line.w < band.x || line.w >= band.z) continue;
-    float f = (line.w - band.x) / (band.z - band.x);
-    if (BENT) f += weights.w * f * (1.0 - f);
-    sum += line.rgb * normal((f - at.y) / s) * shape.z * carried_at(line.w);
+    sum += line.rgb * normal((way_to(line.w) - at.y) / s) * shape.z * carried_at(line.w);
   }
   deposited = vec4(share * sum, 0.0);
 }`;
@@ -298,10 +335,10 @@ vec4 seen_line(vec4 line) {
 }
 // Part of the texel within all edges at t: what borders it, by lengths times distances (shaders/light/beam_coverage.glsl
 // of the desktop program).
-vec4 line_at(int e, float t) {
+vec3 line_at(int e, float t) {
   vec4 line = seen_line(edge_texel(2 * e) + t * edge_texel(2 * e + 1));
   float per = inversesqrt(max(dot(line.xy, line.xy), 1e-30));
-  return vec4(line.xy * per, line.z * per / line.w, 0.0);
+  return vec3(line.xy * per, line.z * per / line.w);
 }
 vec2 in_texel(vec2 n, float h) {
   vec2 foot = -h * n, d = vec2(-n.y, n.x);
@@ -309,10 +346,19 @@ vec2 in_texel(vec2 n, float h) {
   vec2 p = (-0.5 - foot) / d, q = (0.5 - foot) / d, low = min(p, q), high = max(p, q);
   return vec2(max(low.x, low.y), min(high.x, high.y));
 }
-int crossings = 0, crossing = 0;
+const int MOST = 16;
 float covered(float t) {
-  if (crossings == 1) {
-    vec4 line = line_at(list.x + crossing, t);
+  vec3 lines[MOST];
+  int count = 0;
+  for (int i = 0; i < list.y; ++i) {
+    vec3 own = line_at(list.x + i, t);
+    float reach = 0.5 * (abs(own.x) + abs(own.y));
+    if (own.z <= -reach) return 0.0;
+    if (own.z < reach && count < MOST) lines[count++] = own;
+  }
+  if (count == 0) return 1.0;
+  if (count == 1) {
+    vec3 line = lines[0];
     vec2 n = abs(line.xy);
     float sum = 0.5 * (n.x + n.y), difference = 0.5 * abs(n.x - n.y), h = abs(line.z), missing = max(sum - h, 0.0);
     float share = h <= difference ? 0.5 + h / max(n.x, n.y) : 1.0 - missing * missing / max(2.0 * n.x * n.y, 1e-12);
@@ -320,15 +366,12 @@ float covered(float t) {
   }
   float twice = 0.0;
   vec4 low = vec4(-0.5), high = vec4(0.5);
-  for (int i = 0; i < list.y; ++i) {
-    vec4 own = line_at(list.x + i, t);
-    float reach = 0.5 * (abs(own.x) + abs(own.y));
-    if (own.z <= -reach) return 0.0;
-    if (own.z >= reach) continue;
+  for (int i = 0; i < count; ++i) {
+    vec3 own = lines[i];
     vec2 interval = in_texel(own.xy, own.z);
-    for (int j = 0; j < list.y; ++j) {
+    for (int j = 0; j < count; ++j) {
       if (j == i) continue;
-      vec4 other = line_at(list.x + j, t);
+      vec3 other = lines[j];
       float turn = dot(own.xy, other.xy), along = own.x * other.y - own.y * other.x;
       if (abs(along) < 1e-6) {
         float inside = other.z - own.z * turn;
@@ -374,21 +417,23 @@ void main() {
   sides = mat2(to_uv[0].xy - uv * to_uv[0].z, to_uv[1].xy - uv * to_uv[1].z) * wider / uvw.z;
   float wide = band.y - band.x;
   vec2 lit = wide > 0.0 ? (clamp(support, band.xx, band.yy) - band.x) / wide : vec2(0.0, 1.0), touched = lit, whole = lit;
+  float moves = 0.0;  // texels, of the edges that matter
   for (int i = 0; i < list.y; ++i) {
     vec4 start = edge_texel(2 * (list.x + i)), from = seen_line(start), to = seen_line(start + edge_texel(2 * (list.x + i) + 1));
     float h = from.z, dh = to.z - h, r = 0.5 * (abs(from.x) + abs(from.y)) * from.w;
     float dr = 0.5 * (abs(to.x) + abs(to.y)) * to.w - r;
     vec2 touches = positive(h + r, dh + dr), covers = positive(h - r, dh - dr);
-    if (covers.x > lit.x || covers.y < lit.y) { crossings++; crossing = i; }
+    if (covers.x > lit.x || covers.y < lit.y) moves = max(moves, abs(dh / from.w) / length(from.xy));
     touched = vec2(max(touched.x, touches.x), min(touched.y, touches.y));
     whole = vec2(max(whole.x, covers.x), min(whole.y, covers.y));
   }
   if (touched.x > touched.y) discard;
+  moves *= 3.0;
   if (whole.x < whole.y) {
     add(whole, 3, true);
-    if (whole.x > touched.x) add(vec2(touched.x, whole.x), 4, false);
-    if (whole.y < touched.y) add(vec2(whole.y, touched.y), 4, false);
-  } else add(touched, 8, false);
+    if (whole.x > touched.x) add(vec2(touched.x, whole.x), clamp(int(ceil(moves * (whole.x - touched.x))), 1, 4), false);
+    if (whole.y < touched.y) add(vec2(whole.y, touched.y), clamp(int(ceil(moves * (touched.y - whole.y))), 1, 4), false);
+  } else add(touched, clamp(int(ceil(moves * (touched.y - touched.x))), 1, 8), false);
   for (int k = 0; k < lines; ++k) {
     vec4 line = line_of(list.z, k);
     if (line.w < band.x || line.w >= band.y) continue;
