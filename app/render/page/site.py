@@ -42,7 +42,7 @@ class Card:
 
 def write_index(folder: Path, parts: dict[str, list[Card]], documents: str | None) -> None:
     """`parts`: cards by the heading over them; `documents`: path of the first one."""
-    text = "<h1>Caustics to play with</h1><p>Every picture opens a page on which its dispersion can be dragged.</p>"
+    text = "<h1>Caustics to play with</h1><p>Every picture opens a page whose light can be changed.</p>"
     text += f'<p><a href="{documents}">About SpectraSplat</a></p>' if documents else ""
     for heading, cards in parts.items():
         text += f'<h2>{html.escape(heading)}</h2><ul class="cards">{"".join(map(_card, cards))}</ul>'
