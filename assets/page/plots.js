@@ -8,7 +8,8 @@ export function coloursOf(observer) {
   for (const value of observer) most = Math.max(most, value);
   return Array.from({ length: COUNT }, (_, i) => {
     const rgb = [0, 1, 2].map((c) => observer[3 * i + c] / most), white = Math.max(-Math.min(...rgb), 0);
-    const shown = rgb.map((c) => Math.min(1, 0.04 + 1.6 * (c + white)) ** (1 / 2.2));
+    const top = Math.max(...rgb) + white, bright = Math.min(Math.max(1.6 * top, 0.08), 1);
+    const shown = rgb.map((c) => (((c + white) / (top || 1)) * bright) ** (1 / 2.2));
     return `rgb(${shown.map((c) => Math.round(255 * c)).join(" ")})`;
   });
 }
