@@ -31,7 +31,8 @@ void cross_crystal(inout Path path, Hit hit, Event event, uint pixel_key) {
         path.walk.inverse_pdf = 0.0;
         return;
     }
-    bool strong = least > 0.0 && (path.depth <= 1u || path.walk.branch_weight * least > max(p.split_threshold, MIN_ORDER_SHARE)),
+    bool strong = least > 0.0
+        && (path.depth <= 1u || path.walk.branch_weight * least > max(p.split_threshold, MIN_ORDER_SHARE)),
          splits = strong && stack_size + LOBES - 1 <= STACK;
     if (strong && !splits) atomicAdd(fallbacks[FELL_STACK], 1u);
     if (!splits) kept = chosen_lobe(likely, choice(path, pixel_key) * all);

@@ -60,7 +60,7 @@ def test_what_microfacets_throw_at_each_other_is_given_back(gl) -> None:
     texture = spectra_texture(
         gl.ctx, np.concatenate([np.ones((3, SAMPLES)), rough_surfaces.glass_tables(widths, SAMPLES)])
     )
-    first = np.array([rough_surfaces.GLASS_ROWS * rough_surfaces.distinct_widths(widths).index(w) for w in width])
+    first = np.array([rough_surfaces.first_row_of(w, rough_surfaces.distinct_widths(widths), False) for w in width])
     got = evaluate(
         gl.ctx,
         ["lib/rough_energy.glsl"],
@@ -77,7 +77,7 @@ def test_what_microfacets_throw_at_each_other_is_given_back(gl) -> None:
         binders=[lambda: texture.use(bindings.UNIT_SPECTRA)],
     )["factor"]
     texture.release()
-    own = rough_albedo.albedo_tables(np.array(widths))
+    own = rough_albedo.albedo_tables(np.array(widths), np.zeros(2, bool))
     cases = list(zip(width, ratio, angle, strict=True))
     kept = np.array([rough_albedo.sent_on(own, widths.index(w), np.cos(a), eta) for w, eta, a in cases])
     np.testing.assert_allclose(got, 1.0 / kept, rtol=1e-2)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import spectrasplat as ss
 from scipy.ndimage import gaussian_filter
+from spectrasplat.base.generators import finished
 from spectrasplat.edit.glass import bent
 from spectrasplat.edit.parameters import Stage
 from spectrasplat.edit.state import Selection
@@ -46,9 +47,7 @@ def settings(photons: int, receiver: str = "table", seed: int = 1, bins: int | N
 
 
 def gradient_of(gl, scene: Scene, path: str, its: RenderSettings) -> Gradient:
-    found = gradient(gl, Stage(scene, scene.camera), its, [path])
-    assert found is not None
-    return found
+    return finished(gradient(gl, Stage(scene, scene.camera), its, [path]))
 
 
 def difference(gl, scene: Scene, path: str, found: Gradient, its: RenderSettings) -> np.ndarray:

@@ -81,7 +81,7 @@ def test_what_only_the_driver_can_tell_stays_whole(condition: str) -> None:
         ("if (!(OFF || a)) f();", "if (!a) f();"),
         ("if (!OFF) { if (OFF) f(); g(); }", "g();"),
         ("if (COUNT > 1 && !(COUNT == 3)) f();", "f();"),
-        ("if (f() || ON) g();", "if (f() || ON) g();"),  # f may do something
+        ("if (f() || ON) g();", "if (f() || true) g();"),  # f may do something
         ("if (i < COUNT) f();", "if (i < COUNT) f();"),
         ("x = ON ? a : b;", "x = a;"),
         ("x = OFF ? a : b ? c : d;", "x = b ? c : d;"),

@@ -203,10 +203,10 @@ def test_small_angles_are_exact() -> None:
     assert measuring.angle_deg(((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (2.0, 0.0, 0.0))) is None
 
 
-def test_there_are_seven_lessons_each_with_a_scene_that_holds_what_it_is_about(
+def test_each_lesson_has_a_scene_that_holds_what_it_is_about(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert len(lessons()) == 7 and main(["lesson"]) == 0
+    assert len(lessons()) == 8 and main(["lesson"]) == 0
     listed = capsys.readouterr().out
     for each in lessons():
         scene = load_scene(each.path)

@@ -79,7 +79,7 @@ def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Sce
         from ..lens_scene import scene_of_lens
 
         if staging != AS_FOUND:
-            raise UserError(f"{path.name}: --up, --glass and --smooth are for meshes; a lens file names its glasses")
+            raise UserError(f"{path.name}: a lens file names its axis and glasses; leave out those given besides")
         scene = scene_of_lens(read_prescription(path))
     else:
         raise UserError(f"{path}: '{path.suffix}' is not a kind of scene; use {', '.join(SCENE_SUFFIXES)}")
