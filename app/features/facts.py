@@ -162,8 +162,9 @@ class Facts:
 
     @cached_property
     def is_by_photons(self) -> bool:
-        """Photons carry what some glass or mirror does with light."""
-        return any(o.material.is_specular for i, o in enumerate(self.scene.objects) if i not in self.beam_objects)
+        """Photons carry what some glass or mirror does with light, or may: beams end at what is flat alone."""
+        by_photons = any(o.material.is_specular for i, o in enumerate(self.scene.objects) if i not in self.beam_objects)
+        return by_photons or len(self.flat_receivers) < len(self.receivers)
 
     @property
     def is_painted(self) -> bool:

@@ -291,10 +291,10 @@ class PilotFit:
         # M copies over a disc of radius r lie r sqrt(pi / M) apart, and a footprint's standard deviation is
         # smoothing * h sqrt(M): equal to 0.45 of the distance at M = 0.8 r / (smoothing h).
         copies = 0.8 * ratio / self.smoothing
-        if copies < (FEWEST_COVERED if self.lamp_columns else FEWEST_COPIES):
+        count = int(min(np.ceil(copies), MAX_LIGHT_POINTS, self.budget // (bands * MIN_LATTICE)))
+        if min(copies, count) < (FEWEST_COVERED if self.lamp_columns else FEWEST_COPIES):
             return 1
-        count = int(np.clip(np.ceil(copies), 1, max(1, min(MAX_LIGHT_POINTS, self.budget // (bands * MIN_LATTICE)))))
-        return count + count % 2 if count > 1 else 1  # each with its mirror image: lib/lattice.glsl
+        return count + count % 2  # each with its mirror image: lib/lattice.glsl
 
     def _coarsening(self, lattices: int) -> float:
         """Spacing of a sub-lattice of the pass over that of the pilot."""
