@@ -316,9 +316,7 @@ def halve_space(beam, other, work):
     low = cut(beam, line, 1.0, zero, zero, half, way, work)
     high = cut(other, line, -1.0, zero, zero, half, way, work)
     beam.key, other.key = mixed(beam.key, np.int64(13)), mixed(other.key, np.int64(14))
-    forget_idle_lines(beam, work)
     recentre(beam)
-    forget_idle_lines(other, work)
     recentre(other)
     return low, high
 

@@ -67,7 +67,7 @@ MANY = 800.0
 stone holds much of its picture."""
 _STEP_FACETS = 60
 """A step costs as much as it takes to test so many facets, besides those of the scene."""
-_PICTURE_SHARE = 0.5
+_PICTURE_SHARE = 0.125
 """Share of a texel that is half a pixel to which the sweep's chord keeps, for up to `_SHARE_PHOTONS`: with more photons
 it falls as their number rises, down to `_LEAST_SHARE`. What the chord misses is all that is left in such maps."""
 _SHARE_PHOTONS = 1e5
