@@ -86,7 +86,7 @@ class Window:
     low: np.ndarray
     high: np.ndarray
     largest: int | None = None
-    """Longest side, texels, of a window of one texel a pixel; None: as `Fineness` says."""
+    """Longest side, texels, where that is not `Fineness`'s."""
 
     @property
     def size(self) -> np.ndarray:
@@ -357,11 +357,10 @@ def _flat_windows(
             fineness.fine,
         )
         if on_pixels is not None:
-            # Only glass and mirrors show what lands beside those pixels.
-            beside = [] if on_pixels.is_all else [replace(everything, largest=fineness.coarse)]
-            return [on_pixels, *beside, *_beyond(everything, seen, extent)]
+            known: list[Window | PictureWindow] = [on_pixels] if on_pixels.is_all else [on_pixels, everything]
+            return [*known, *_beyond(everything, seen, extent)]
     fine = light if seen is None else meet(light, grown(seen, 0.02))
-    known: list[Window | PictureWindow] = [everything]
+    known = [everything]
     if fine is not None:
         fine = widened(fine)
         known = [everything] if np.prod(fine.size) > 0.6 * np.prod(everything.size) else [fine, everything]
