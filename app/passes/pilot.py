@@ -62,6 +62,7 @@ _FULL = 0.8
 _FLIGHTS_OF_EVERY = 8
 """Only one in so many points is traced to count flights: weak branches are many, and this is but a ratio."""
 _FOR_MAPS_OF_EVERY = 4
+"""Likewise where all that is asked is where light lands."""
 MAX_LIGHT_POINTS = 256
 FEWEST_COPIES = 3.4
 """With fewer, a single one from the lamp's middle errs by less: it lacks the lamp's variance r²/4 but for its own
