@@ -11,7 +11,7 @@ from .scenes import find_scene
 if TYPE_CHECKING:
     from ..model.optics.lens_design import Lens
     from ..model.plate_check import Cancelled, PlateReport, Report
-    from .table import LensCheck, LensTable
+    from .solving_table import LensCheck, LensTable
 
 
 def lens_table(options: LensTable) -> int:

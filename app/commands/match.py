@@ -9,7 +9,7 @@ from ..base.errors import UserError
 from ..base.interrupts import interrupt_flag
 from .opened import note_assumptions, open_scene, settings_for
 from .printing import show
-from .table import Match
+from .solving_table import Match
 
 
 def match(options: Match) -> int:

@@ -1,7 +1,7 @@
 """The command line: what the commands are called and which function each of them runs.
 
-Their options are in `table` and `measuring_table`. A command's module is imported when it runs, so that `--help` and
-small commands start at once.
+Their options are in `table`, `solving_table` and `measuring_table`. A command's module is imported when it runs, so
+that `--help` and small commands start at once.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ COMMANDS = {
     "lesson": ("table:Lesson", "view:lesson"),
     "bake": ("table:Bake", "bake:bake_texture"),
     "export": ("table:Export", "bake:export"),
-    "match": ("table:Match", "match:match"),
+    "match": ("solving_table:Match", "match:match"),
     "gallery": ("table:Gallery", "gallery:gallery"),
     "inspect": ("table:Inspect", "inspect_report:inspect"),
     "glass": ("table:Glass", "glass:glass"),
-    "lens table": ("table:LensTable", "lens:lens_table"),
-    "lens check": ("table:LensCheck", "lens:lens_check"),
+    "lens table": ("solving_table:LensTable", "lens:lens_table"),
+    "lens check": ("solving_table:LensCheck", "lens:lens_check"),
     "doctor": ("table:Doctor", "doctor:doctor"),
     "bench": ("measuring_table:Bench", "bench:bench"),
     "stress": ("measuring_table:Stress", "stress:stress"),

@@ -48,7 +48,7 @@ _SHOWN, _LINEAR = ", ".join(OFFERED_SHOWN), _either(*OFFERED_LINEAR)
 _NOT_LINEAR = f"not of {' and '.join(OFFERED_LINEAR)}"
 _SPECTRAL = ", ".join(SPECTRAL_SUFFIXES)
 _FORMATS = tuple(suffix[1:] for suffix in (*OFFERED_SHOWN, *OFFERED_LINEAR))
-_A_LENGTH = " a length in the scene's unit, for example 0.05"
+A_LENGTH = " a length in the scene's unit, for example 0.05"
 
 
 def _up(flag: str, text: str) -> str:
@@ -80,8 +80,8 @@ _SCENE = Option(
     is_argument=True,
 )
 _SIZE = Option("WxH", "Pixels; default: the scene's.", options.size, sets="settings", fields=("width", "height"))
-_PHOTONS = Option("N", "Photons to emit; default: the scene's.", options.photons, sets="settings")
-_SEED = Option("K", "Seed of the random numbers; default: 1.", _seed, sets="settings")
+PHOTONS = Option("N", "Photons to emit; default: the scene's.", options.photons, sets="settings")
+SEED = Option("K", "Seed of the random numbers; default: 1.", _seed, sets="settings")
 _METHOD = Option(
     "NAME",
     f"How wavelengths are sampled: {', '.join(METHODS)}; default: srd.",
@@ -176,7 +176,7 @@ class Render(OpensScene):
     )
     photons: int | None = setting("N", "Photons to emit, for example 4M; default: the scene's.", options.photons)
     seconds: float | None = setting("S", "Seconds that the picture may take in all, instead.", options.seconds())
-    seed: int | None = shared(_SEED)
+    seed: int | None = shared(SEED)
     method: str | None = shared(_METHOD)
     camera_method: str | None = shared(_CAMERA_METHOD)
     layer: str | None = setting("LAYER", "beauty (default), caustic, or map:RECEIVER.", complete=completion.layers)
@@ -196,13 +196,13 @@ class Render(OpensScene):
     lens_radius: float | None = option(
         "R",
         "Half the aperture of the camera's lens, scene units: what is out of focus is blurred.",
-        options.number(LENS_RADIUS.holds, f"0 or more and up to {LENS_RADIUS.at_most:g}", _A_LENGTH),
+        options.number(LENS_RADIUS.holds, f"0 or more and up to {LENS_RADIUS.at_most:g}", A_LENGTH),
         sets="camera",
     )
     focus_distance: float | None = option(
         "D",
         "From the lens to what is in focus; default: the camera's target.",
-        options.number(FOCUS_DISTANCE.holds, f"more than 0 and up to {FOCUS_DISTANCE.at_most:g}", _A_LENGTH),
+        options.number(FOCUS_DISTANCE.holds, f"more than 0 and up to {FOCUS_DISTANCE.at_most:g}", A_LENGTH),
         sets="camera",
     )
     max_depth: int | None = setting(
@@ -336,7 +336,7 @@ class Sweep(ByWorkers, OpensScene):
     exposure: float | None = option(
         "EV", "Stops brighter (or darker) than is automatic in the first picture.", _exposure
     )
-    seed: int | None = shared(_SEED)
+    seed: int | None = shared(SEED)
     method: str | None = shared(_METHOD)
     exact: bool = switch("Trace every point, also where kept photons follow to first order.")
     overwrite: bool = switch("Replace another sweep in the folder.")
@@ -384,8 +384,8 @@ class BakesCaustic(OpensScene):
         options.size,
         fields=("width", "height"),
     )
-    photons: int | None = shared(_PHOTONS)
-    seed: int | None = shared(_SEED)
+    photons: int | None = shared(PHOTONS)
+    seed: int | None = shared(SEED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -414,29 +414,6 @@ class Export(BakesCaustic):
     source: tuple[float, float, float] | None = option(
         "X,Y,Z", "Where the cookie's spot is; default: at the scene's only lamp, or straight above.", options.place
     )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Match(OpensScene):
-    """Rank the catalogue's glasses by how near the light that an object of each casts comes to what is wanted."""
-
-    through: str = argument("OBJECT", "The object of glass.")
-    receiver: str = argument("RECEIVER", "The flat object that is lit.", complete=completion.receivers)
-    target: Path | None = option(
-        "FILE",
-        "The light that is wanted: a picture, or a .csv of spectra, a line a place, of 4 to 32 even bins from 380 to "
-        "780 nm; default: the scene's own light, for a dispersion gain that nature does not offer.",
-    )
-    begin: tuple[float, float, float] | None = option(
-        "X,Y,Z", "Where the target's first row begins on the receiver (of a picture, its upper left).", options.place
-    )
-    end: tuple[float, float, float] | None = option("X,Y,Z", "Where its first row ends.", options.place)
-    last: tuple[float, float, float] | None = option(
-        "X,Y,Z", "Where its last row begins; default: the target is a line.", options.place
-    )
-    count: int | None = option("N", "Glasses that are listed; default: 10.", options.integer(1, 2000))
-    photons: int | None = shared(_PHOTONS)
-    seed: int | None = shared(_SEED)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -472,41 +449,6 @@ class Glass:
         "[QUERY]", "Part of a name or maker; nothing lists all.", complete=completion.glasses, default=""
     )
     plot: Path | None = option("FILE.png", "Plot n over the wavelength and the place in the Abbe diagram.")
-
-
-@dataclass(frozen=True, kw_only=True)
-class LensTable(ReadsScenes):
-    """Show a lens's focal lengths, chromatic shift and spots by wavelength."""
-
-    file: str = argument(
-        "FILE", "A prescription (.csv, .zmx), or a scene with objects of shape lens.", complete=completion.scenes
-    )
-    object: str | None = option(
-        "NAME", "One of the scene's lenses; those on its axis belong to it; default: the first."
-    )
-    beam: float | None = option(
-        "D",
-        "Diameter of the parallel light that enters; default: the file's, or all that passes.",
-        options.number(lambda value: 0.0 < value < 1e9, "more than 0", _A_LENGTH),
-    )
-    wavelengths: tuple[float, ...] | None = option(
-        "NM,NM", "Wavelengths; default: the file's, or the lines g, F, e, d and C.", options.wavelengths
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class LensCheck:
-    """Check whether a caustic plate draws its picture: focus, error, efficiency, colour blur, tolerances."""
-
-    plate: Path = argument("PLATE", "A mesh (.stl, .ply, .obj) with one flat side and, across from it, a shaped one.")
-    glass: str = option("GLASS", "What it is made of; default: PMMA.", complete=completion.glasses, default="PMMA")
-    distance: float | None = option(
-        "D",
-        "From the plate's far side to the screen, in the mesh's unit; default: where it is most like the target.",
-        options.number(lambda value: 0.0 < value < 1e9, "more than 0", " in the mesh's unit, for example 300"),
-    )
-    output: Path | None = target("OUT", "Write the target and, next to it, what the plate draws.", default=None)
-    target: Path = option("PICTURE", "The picture that it was made for.", default=MISSING)
 
 
 @dataclass(frozen=True, kw_only=True)
