@@ -17,14 +17,16 @@ from .search import (
     SUM_LEAVES,
     SUM_LEFT,
     band_power,
-    centroid,
     flux_of,
     halve_space,
+    halve_spectrum,
     is_curved,
     medium,
+    mixed,
     passes_at,
     power_as,
     recentre,
+    unit,
 )
 
 _UNEVEN = 0.15
@@ -35,10 +37,6 @@ _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
 _CROOKED = 0.25
 """Share of its width that a polygon's edges may miss where it cannot be halved: it still has nearly its own area."""
-_FARTHEST = 64.0
-"""Lengths of a faint crooked polygon that it may move by."""
-_UNLIKE = 4.0
-"""Longest over shortest of its lengths."""
 _SHARP = 0.05
 """Share of a polygon's widest penumbra: an edge of the facet left last that is sharper masks what is drawn."""
 _BESIDE = 1e-7
@@ -82,58 +80,17 @@ def even_out(beam, new, corner, work):
 
 
 @part
-def extents(beam, at, u, v, corner, work):
-    """Along (u, v) and across it: least and largest of the corners that the polygon just laid has at a place."""
-    outline, _ = outline_of(beam, corner, at, work)
-    low, high, left, right = 1e300, -1e300, 1e300, -1e300
-    for c in range(len(outline)):
-        along, across = outline[c, 0] * u + outline[c, 1] * v, outline[c, 1] * u - outline[c, 0] * v
-        low, high, left, right = min(low, along), max(high, along), min(left, across), max(right, across)
-    return low, high, left, right
-
-
-@part
-def move_straight(beam, new, edge, corner, tables, work):
-    """Let the leaf just laid be a box that goes straight from its first place to its last and is wide enough for what
-    lies between. False, and nothing is changed, where it goes too far for its light to be spread evenly."""
-    if first_place(beam) > 0 or min(beam.corners[0], min(beam.corners[1], beam.corners[2])) == 0:
-        return False
-    flux, power = flux_of(beam, tables, work), band_power(beam, tables, work)
-    u = v = 0.0
-    for a in range(0, 3, 2):
-        outline, _ = outline_of(beam, corner, a, work)
-        centroid(outline, len(outline), work.point)
-        u, v = work.point[0] - u, work.point[1] - v
-    way = np.sqrt(u * u + v * v)
-    if way <= 0.0 or power <= 0.0:
-        return False
-    u, v = u / way, v / way
-    low0, high0, left0, right0 = extents(beam, 0, u, v, corner, work)
-    low1, high1, left1, right1 = extents(beam, 1, u, v, corner, work)
-    low2, high2, left2, right2 = extents(beam, 2, u, v, corner, work)
-    left, right = min(left0, min(left1, left2)), max(right0, max(right1, right2))
-    longest = max(high0 - low0, max(high1 - low1, high2 - low2))
-    shortest = min(high0 - low0, min(high1 - low1, high2 - low2))
-    if way > _FARTHEST * longest or longest > _UNLIKE * shortest or right <= left:
-        return False
-    begin, ends = work.count[1], work.count[2]
-    for ln in range(4):
-        line, sign = edge[begin + ln].line, 1.0 - 2.0 * (ln % 2)
-        edge[begin + ln].soft = 0.0
-        for a in range(3):
-            t = 0.5 * a
-            low, high = low0 + t * (low2 - low0), high0 + t * (high2 - high0)
-            if ln < 2:
-                line[a, 0], line[a, 1], line[a, 2] = sign * u, sign * v, -low if ln == 0 else high
-            else:
-                line[a, 0], line[a, 1], line[a, 2] = -sign * v, sign * u, -left if ln == 2 else right
-            new.density[a] = flux / power / ((high - low) * (right - left))
-    for c in range(8):
-        along = (low0, high0, low2, high2)[c // 2]
-        across = left if (c % 2 == 0) == (c // 2 % 2 == 0) else right
-        corner[ends + c, 0], corner[ends + c, 1] = along * u - across * v, along * v + across * u
-    new.edges, new.corners = 4, 8
-    return True
+def halve_by_chance(nodes, facets, solids, tables, sources, work):
+    """Cut the current beam's band in the middle and leave one half on the stack, by chance, with the light of both."""
+    beam, other = nodes[CURRENT], nodes[work.top]
+    low, high = halve_spectrum(beam, other, 0.5 * (beam.x[0] + beam.x[2]), facets, solids, tables, sources[0], work)
+    lower, upper = flux_of(beam, tables, work) if low else 0.0, flux_of(other, tables, work) if high else 0.0
+    if not lower + upper > 0.0:
+        return
+    is_lower = unit(mixed(beam.key ^ work.seed, np.int64(18))) * (lower + upper) < lower
+    kept = beam if is_lower else other
+    kept.boost *= (lower + upper) / (lower if is_lower else upper)
+    push_both(nodes, is_lower, not is_lower, work)
 
 
 @part
@@ -193,8 +150,13 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     uneven = uneven if work.disperses or kind == LEAF_RECEIVER else 0.0
     bent = bent if work.disperses else 0.0
     missed = misplaced(beam, bent, corner, work) if bent > tolerance else 0.0
-    if room and beam.x[2] - beam.x[0] > NARROWEST and (missed * power > faint or uneven > most):
+    is_wide = beam.x[2] - beam.x[0] > NARROWEST
+    if room and is_wide and (missed * power > faint or uneven > most):
         halve(nodes, 0.5 * (beam.x[0] + beam.x[2]), facets, solids, tables, sources, work)
+        return
+    crooked = kind == LEAF_RECEIVER and missed > _CROOKED
+    if crooked and is_wide and work.top + 2 < len(nodes):
+        halve_by_chance(nodes, facets, solids, tables, sources, work)
         return
     row, first = work.count[0], work.count[2]
     new = leaf[row]
@@ -215,13 +177,11 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         if kind == LEAF_RECEIVER:
             mask_edges(beam, own_lines, new, edge, corner, work)
     anchor_density(beam, new, work)
-    # What is too faint to be halved and yet neither straight nor even must hold its own flux at least.
-    if kind == LEAF_RECEIVER:
-        crooked = missed > _CROOKED
-        if crooked or steepest > 1.0:
-            even_out(beam, new, corner, work)
-        if crooked and not move_straight(beam, new, edge, corner, tables, work):
-            stand_still(beam, new, edge, corner, tables, work)
+    # What cannot be halved and yet is neither straight nor even must hold its own flux at least.
+    if crooked or (kind == LEAF_RECEIVER and steepest > 1.0):
+        even_out(beam, new, corner, work)
+    if crooked:
+        stand_still(beam, new, edge, corner, tables, work)
     flux = flux_of(beam, tables, work)
     new.flux = flux
     work.count[0] += 1
