@@ -87,7 +87,6 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
         scene.facets["receiver"][leaf["facet"]].astype(np.int32),
         leaf["source"].astype(np.int32),
         leaf["depth"].astype(np.int32),
-        leaf["met"],
         x[:, 0] + t[:, 0] * (x[:, 2] - x[:, 0]),
         x[:, 0] + t[:, 1] * (x[:, 2] - x[:, 0]),
         np.maximum(density, 0.0) * unit * unit,

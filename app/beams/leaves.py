@@ -25,9 +25,8 @@ LEAF = np.dtype(
         # Numbers of its edges, and of corners of its polygons at its three places, one after the other.
         ("edges", "i8"),
         ("corners", "i8"),
-        # Hash of its path; objects met (bit i mod 64 for object i).
+        # Hash of its path.
         ("key", "i8"),
-        ("met", "i8"),
         # Spectral coordinate of the three places: start, middle and end of the band.
         ("x", "f8", 3),
         # Flux per unit of the target's area and of the light's spectral power, roulette's gain included, there.
@@ -190,9 +189,6 @@ def lay_leaf(beam, facets, kind, leaf, edge, corner, work):
     new.source = facets[beam.path[0, 0]].owner if flight > 0 else -1
     new.depth, new.inside = beam.depth, beam.mask
     new.key = np.int64(beam.key >> np.uint64(33))
-    new.met = 0
-    for k in range(flight):
-        new.met |= np.int64(1) << np.int64(facets[beam.path[k, 0]].owner & 63)
     for a in range(3):
         b = a if lo == 0 else 1
         new.x[a] = beam.x[a]

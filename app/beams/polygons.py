@@ -59,8 +59,6 @@ class BeamPolygons(Outlines):
     """int32 (N,), object that the beam met first."""
     depth: np.ndarray
     """int32 (N,), specular events on the way."""
-    met: np.ndarray
-    """int64 (N,), objects met on the way: bit i mod 64 for object i."""
     x_lo: np.ndarray
     """(N,), start of the band."""
     x_hi: np.ndarray

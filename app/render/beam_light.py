@@ -9,15 +9,14 @@ from __future__ import annotations
 
 import time
 from collections.abc import Generator, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.generators import finished, mapped, timed
 from ..beams.light_beams import BeamFinder, LightBeams
-from ..beams.polygons import BeamPolygons, joined
+from ..beams.polygons import BeamPolygons
 from ..beams.search import (
     SUM_ABSORBED,
     SUM_DEPOSITED,
@@ -28,7 +27,6 @@ from ..beams.search import (
     SUM_NUMERIC,
     SUM_ROULETTE,
 )
-from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.scene import Scene
@@ -42,9 +40,6 @@ from .beam_worker import BeamWorker
 from .light_maps import LightMaps
 from .sampling import SURVEY, MovingBeams
 from .shown_spectra import ShownSpectra
-
-if TYPE_CHECKING:
-    import moderngl
 
 PHOTONS_A_BEAM = 2.0
 """Photons that a beam counts as in a scene of few facets, half of them for what it leaves."""
@@ -115,23 +110,6 @@ _compiled: list[bool] = []
 """Holds something once a search has run in this process."""
 
 
-@dataclass(frozen=True)
-class _KeptBeams:
-    """Polygons of a search that an edit leaves as they are."""
-
-    search: LightBeams
-    changed: int
-    """Objects that differ, a bit each (`BeamPolygons.met`)."""
-    polygons: BeamPolygons
-
-    def joined(self, found: LightBeams) -> tuple[LightBeams, BeamPolygons | None]:
-        """What was `found`, but for light that is kept; and its polygons that are not."""
-        if found.polygons is None:
-            return replace(found, polygons=self.polygons), None
-        touched = found.polygons.where(found.polygons.met & self.changed != 0)
-        return replace(found, polygons=joined([self.polygons, touched])), touched
-
-
 class BeamLight:
     """Finds and draws the beams of one scene's lights."""
 
@@ -179,10 +157,6 @@ class BeamLight:
         """What maps are fitted to."""
         self.found: LightBeams | None = None
         """The last that were drawn, or found by the survey."""
-        self._finest = np.inf, LightBeams({})
-        """Threshold and beams of the finest search of what is traced: what meets nothing edited stays as in it."""
-        self._ground: tuple[LightMaps, _KeptBeams, list[moderngl.Texture]] | None = None
-        """Maps, what they hold while something is dragged, and a copy of that."""
 
     def surveying(self, moving: MovingBeams | None = None) -> Iterator[str | None]:
         """Find out which objects' light beams carry, and whether that pays, pausing with the name of what is done now
@@ -290,10 +264,6 @@ class BeamLight:
             enough = _ENOUGH * followed * self._photons_a_beam >= photons
             if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
-        if tails and found.polygons is not None and threshold <= self._finest[0]:
-            self._finest = threshold, found
-        if not tails and (kept := self._kept(threshold)) is not None:
-            found, _ = kept.joined(found)
         self.found = found
         self._count(found)
         if found.polygons is not None:
@@ -316,55 +286,20 @@ class BeamLight:
         beams = max(photons, 1.0) / self._photons_a_beam
         return float(np.clip(SURVEY * (surveyed / beams) ** (1.0 / growth), FINEST, COARSEST))
 
-    def draw_moving(
-        self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float, *, alone: bool = False
-    ) -> None:
-        """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`. `alone`:
-        nothing else is in the maps; light that meets nothing edited is then drawn once and kept."""
+    def draw_moving(self, maps: LightMaps, weight: float, moving: MovingBeams, seconds: float) -> None:
+        """Find beams at once, as fine as `seconds` allow, and add them to `maps` of any layout times `weight`. Weak
+        ones play roulette: none of their light is missing."""
         self.pause()
         if self._coarse is None or self._coarse[0] is not maps.layout:
             finder = self.finder.shown_as(self.finder.shown)
             finder.set_texels(self._texels(maps.layout))
             self._coarse = maps.layout, finder
-        kept = self._kept(moving.threshold) if alone else None
-        if kept is not None:
-            self._lay_ground(maps, weight, kept)
         started = time.perf_counter()
-        found = _found(self._coarse[1], moving.threshold, self._depth)
-        self.found, drawn = (found, found.polygons) if kept is None else kept.joined(found)
-        if drawn is not None:
-            self.draw(drawn, maps, weight)
+        self.found = _found(self._coarse[1], moving.threshold, self._depth)
+        if self.found.polygons is not None:
+            self.draw(self.found.polygons, maps, weight)
             self._context.finish()
         moving.learn(time.perf_counter() - started, seconds)
-
-    def _kept(self, threshold: float) -> _KeptBeams | None:
-        """Light of the finest search that met nothing that differs from what was traced; None where that search was no
-        finer than `threshold`. What it left to photons is missing."""
-        (finer, finest), before, shown = self._finest, self._traced.shown, self.finder.shown
-        lights = zip(before.lights, shown.lights, strict=True)
-        if threshold <= finer or any(a.spectral_power is not b.spectral_power for a, b in lights):
-            return None
-        differs = [a.material is not b.material for a, b in zip(before.objects, shown.objects, strict=True)]
-        changed = np.bitwise_or.reduce(np.int64(1) << (np.flatnonzero(differs) & 63), initial=np.int64(0))
-        if not changed:
-            return None  # a search of everything misses nothing
-        assert finest.polygons is not None
-        return _KeptBeams(finest, int(changed), finest.polygons.where(finest.polygons.met & changed == 0))
-
-    def _lay_ground(self, maps: LightMaps, weight: float, kept: _KeptBeams) -> None:
-        """Make `maps` hold what is kept; from the second time on by a copy."""
-        ground = self._ground
-        if ground and ground[0] is maps and ground[1].search is kept.search and ground[1].changed == kept.changed:
-            maps.bring_back(ground[2], weight)
-            return
-        self._drop_ground()
-        self.draw(kept.polygons, maps, weight)
-        self._ground = maps, kept, maps.copied_sums()
-
-    def _drop_ground(self) -> None:
-        if self._ground is not None:
-            shader.release(*self._ground[2])
-        self._ground = None
 
     @property
     def counts(self) -> tuple[int, int]:
@@ -438,7 +373,6 @@ class BeamLight:
     def release(self) -> None:
         """Free everything; a search that runs ends soon."""
         self._worker.release()
-        self._drop_ground()
         self.drawing.release()
 
 

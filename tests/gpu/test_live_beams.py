@@ -89,22 +89,18 @@ def test_the_brush_asks_for_photons_and_back(gl: Context) -> None:
         light.release()
 
 
-def test_a_dragged_glass_leaves_the_light_of_others_as_fine_as_it_was(gl: Context) -> None:
+def test_an_edit_of_one_glass_leaves_the_light_of_the_others(gl: Context) -> None:
+    """What weak beams of a stone had left to photons, 7 % of all light here, once went as soon as a prism beside it was
+    edited; roulette scatters by less than 2 %."""
     scene = shipped("default")
     light = begun(gl, scene)
     try:
         for _ in light.light_pass.pass_steps(0, PHOTONS):
             pass
-        before = light.light_pass.survey.beams.found.polygons
-        alone = before.met & 1 == 0  # light that never met the prism
-        assert 0 < alone.sum() < len(before) and alone[before.source == 1].any()
-        first = edited(scene, 1.5).objects[0]
+        before = maps(light)[..., 3].sum()
+        first = edited(scene, 1.0001).objects[0]
         light.show(inputs(replace(scene, objects=(first, *scene.objects[1:]))))
-        previews = [light.splat_preview(4096).flux() for _ in range(2)]
-        after = light.light_pass.survey.beams.found.polygons
-        assert np.array_equal(after.flux[after.met & 1 == 0], before.flux[alone])
-        assert 0 < (after.met & 1 != 0).sum() < (~alone).sum()  # as coarse as a drag has them
-        assert previews[1] == pytest.approx(previews[0], rel=0.02)  # the first is drawn, the second begins from a copy
+        assert drawn(light)[..., 3].sum() == pytest.approx(before, rel=0.03)
     finally:
         light.release()
 

@@ -118,7 +118,6 @@ def polygon(
         light=np.zeros(1, np.int32),
         receiver=np.full(1, receiver, np.int32),
         source=np.zeros(1, np.int32),
-        met=np.ones(1, np.int64),
         depth=np.ones(1, np.int32),
         x_lo=np.array([band[0]]),
         x_hi=np.array([band[1]]),

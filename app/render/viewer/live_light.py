@@ -292,8 +292,7 @@ class LiveLight:
             self._splat_some(kept, photons, self._preview)
         started = time.perf_counter()
         if beams is not None:
-            weight = self._preview.photon_weight
-            beams.draw_moving(self._preview, weight, self.moving, BEAM_SECONDS, alone=not has_photons)
+            beams.draw_moving(self._preview, self._preview.photon_weight, self.moving, BEAM_SECONDS)
         self.beam_seconds = time.perf_counter() - started
         return self._preview
 
