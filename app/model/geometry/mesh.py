@@ -246,17 +246,18 @@ def _convex_planes(mesh: Mesh) -> np.ndarray | None:
     area_vectors = mesh.area_vectors()
     areas = np.linalg.norm(area_vectors, axis=1)
     normals = normalised(area_vectors)
-    solid = areas > 1e-12 * areas.sum()
+    corners = mesh.corners()
+    tolerance = _COPLANAR_TOLERANCE * float(np.linalg.norm(np.subtract(*mesh.bounds())))
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    solid = areas > 0.5 * tolerance * longest  # a sliver knows no plane, and those of its neighbours bound it
     if mesh.corner_normals is not None:
         cosines = np.einsum("tcj,tj->tc", mesh.corner_normals, normals)
         if (cosines[solid] < 1.0 - 1e-9).any():
             return None
     if not mesh.is_closed or mesh.volume() <= 0.0:
         return None
-    corners = mesh.corners()
     middle = 0.5 * np.add(*mesh.bounds())
     corners = corners - middle
-    tolerance = _COPLANAR_TOLERANCE * float(np.linalg.norm(np.subtract(*mesh.bounds())))
     centroids = corners.mean(axis=1)
 
     planes: list[np.ndarray] = []

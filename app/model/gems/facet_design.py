@@ -1,0 +1,344 @@
+"""Faceting designs: tiers of facets by angle, distance and index on a gear; GemCad's text files (.asc) of them.
+
+A facet's angle is counted from the plane of the girdle: 0 is the table, 90 the girdle, below zero the pavilion, and -0
+a culet. Its distance is that of its plane from the origin, in a unit of the file's own. The index `location` is at the
+front, -y; seen from the table, which faces +z, indices run counter-clockwise, on a gear of negative teeth clockwise.
+Sources: R. W. Strickland, GemCad User's Manual (1992), Index gear; GemCad for Windows User's Guide, ASC files.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+import numpy as np
+
+from ...base import files
+from ...base.atomic import atomic_output
+from ...base.errors import UserError
+from ..geometry.half_spaces import convex_solid, faces_of
+from ..geometry.mesh import Mesh
+
+SUFFIX = ".asc"
+MOST_FACETS = 1000
+_MAX_BYTES = 1 << 20
+_MOST_TEETH = 1000
+_FURTHEST = 1e6
+_LEAST_INDEX, _MOST_INDEX = 1.0, 5.0
+_RECORD = re.compile(r"([agyihfp])(?=[\s\d.+-]|$)\s*", re.IGNORECASE)
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)(e[+-]?\d+)?", re.IGNORECASE)
+
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Tier:
+    """Facets of one angle and distance."""
+
+    angle_deg: float
+    distance: float
+    """Of the planes from the origin."""
+    indices: tuple[float, ...]
+    """Positions on the gear, whole ones as a rule; of a table or culet one that means nothing."""
+    names: tuple[str, ...] = ()
+    """One for each index, "" where it has none; or none at all."""
+    instructions: str = ""
+    """How to cut it."""
+
+    @property
+    def name(self) -> str:
+        """The names of its facets, "" where none has one."""
+        return "/".join(dict.fromkeys(name for name in self.names if name))
+
+    @property
+    def is_below(self) -> bool:
+        """Whether it belongs to the pavilion; -0 does."""
+        return math.copysign(1.0, self.angle_deg) < 0.0
+
+
+@dataclass(frozen=True)
+class FacetDesign:
+    """A stone as it is cut."""
+
+    title: str
+    tiers: tuple[Tier, ...]
+    gear: int = 96
+    """Teeth of the index gear; below zero: its indices run clockwise."""
+    location: float = 0.0
+    """The index at the front, -y."""
+    symmetry: int = 1
+    """As the file says; facets are listed one by one all the same."""
+    is_mirrored: bool = False
+    n_d: float | None = None
+    """The refractive index that it was made for."""
+    headers: tuple[str, ...] = ()
+    footers: tuple[str, ...] = ()
+
+    @cached_property
+    def facets(self) -> tuple[tuple[Tier, float, str], ...]:
+        """Tier, index and name of every facet, in the order of `planes`."""
+        return tuple(
+            (tier, index, name)
+            for tier in self.tiers
+            for index, name in zip(tier.indices, tier.names or ("",) * len(tier.indices), strict=True)
+        )
+
+    @cached_property
+    def planes(self) -> np.ndarray:
+        """Half-spaces n·x <= d, float64 (P, 4) as rows (n, d), one a facet."""
+        signs = np.array([-1.0 if tier.is_below else 1.0 for tier, _, _ in self.facets])
+        angles = np.radians([abs(tier.angle_deg) for tier, _, _ in self.facets])
+        turns = np.array([(index - self.location) / self.gear for _, index, _ in self.facets]) - 0.25
+        across = np.where(angles == 0.0, 0.0, np.sin(angles))
+        azimuths = 2.0 * np.pi * turns
+        normals = [across * np.cos(azimuths), across * np.sin(azimuths), signs * np.cos(angles)]
+        return np.column_stack([*normals, [tier.distance for tier, _, _ in self.facets]])
+
+    @cached_property
+    def cut_away(self) -> tuple[str, ...]:
+        """Facets of which others leave nothing, in words. Raises `UserError` as `mesh`."""
+        _, faces = self._shaped(self.title, faces_of)
+        return tuple(
+            f"{name or tier.name or f'{tier.angle_deg:g}°'} at index {index:g}"
+            for (tier, index, name), face in zip(self.facets, faces, strict=True)
+            if not len(face)
+        )
+
+    def mesh(self, name: str | None = None, source: str | None = None) -> Mesh:
+        """The stone, its table facing +z, in the design's own unit. Raises `UserError` where its facets enclose
+        none."""
+        return self._shaped(source or self.title, lambda planes: convex_solid(name or self.title, planes, source))
+
+    def _shaped(self, where: str, make: Callable[[np.ndarray], T]) -> T:
+        try:
+            return make(self.planes)
+        except ValueError as error:
+            raise UserError(
+                f"{where}: its {len(self.facets)} facets make no stone: {error}; check their angles and distances"
+            ) from None
+
+
+# ---- GemCad's text files ----------------------------------------------------------------------
+
+
+def read_asc(path: str | os.PathLike[str]) -> FacetDesign:
+    """The design in a text file of GemCad's, .asc. Raises `UserError` with line and remedy for what is not understood.
+
+    Keywords in either case, glued to their first number or not, a gear's line without its `g`, lists of indices over
+    several lines, names of several words and any end of line are read; a preform is refused.
+    """
+    path = Path(path)
+    try:
+        text = files.read_any_text(path, _MAX_BYTES)
+    except OSError as error:
+        raise UserError(f"cannot read the design {path}: {files.reason_of(error)}; give a GemCad .asc file") from error
+    reader = _Reader(path)
+    for number, line in enumerate(text.replace("\0", "").replace("\x1a", "").splitlines(), start=1):
+        if words := line.strip():
+            reader.read(number, words)
+    return reader.design()
+
+
+class _Reader:
+    """What was read of a file so far."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.line = path, 0
+        self.values: dict[str, Any] = {}
+        self.texts: dict[str, list[str]] = {"h": [], "f": []}
+        self.tiers: list[_OpenTier] = []
+        self.is_begun = False
+
+    def fail(self, words: str) -> NoReturn:
+        raise UserError(f"{self.path.name}, line {self.line}: {words}")
+
+    def read(self, line: int, words: str) -> None:
+        """Take one line that is not blank."""
+        self.line = line
+        if not self.is_begun:
+            if not words.casefold().startswith("gemcad"):
+                self.fail("it does not begin with 'GemCad': it is no faceting design; save one from GemCad as .asc")
+            self.is_begun = True
+        elif not words.startswith(";"):
+            found = _RECORD.match(words)
+            if found is None or (found[1] in "gG" and self.tiers and not _is_number(words[found.end() :])):
+                self._go_on(words)
+            else:
+                self._record(found[1].casefold(), words[found.end() :].strip())
+
+    def _record(self, key: str, words: str) -> None:
+        if key in self.texts:
+            self.texts[key].append(words)
+        elif key == "a":
+            self.tiers.append(self._tier(words))
+        elif key == "p":
+            self.fail("a preform (p) is not read; turn it into facets in GemCad")
+        else:
+            if key in self.values:
+                self.fail(f"'{key}' was given before; leave one of them")
+            self.values[key] = {"g": self._gear, "y": self._symmetry, "i": self._index}[key](words)
+
+    def _go_on(self, words: str) -> None:
+        """A line without a keyword."""
+        if self.tiers:
+            self.tiers[-1].take(words, self.fail)
+        elif "g" not in self.values and all(_is_number(word) for word in words.split()):
+            self.values["g"] = self._gear(words)
+        else:
+            self.fail(f"'{words[:40]}' is not understood; lines begin with g, y, I, H, a or F")
+
+    def _gear(self, words: str) -> tuple[int, float]:
+        teeth, location = self._numbers(words, "g", 1, 2, (96.0, 0.0))
+        if teeth != int(teeth) or not 3 <= abs(teeth) <= _MOST_TEETH:
+            self.fail(f"a gear has 3 to {_MOST_TEETH} teeth, not {teeth:g}; g 96 0.0 is the usual one")
+        return int(teeth), location
+
+    def _symmetry(self, words: str) -> tuple[int, bool]:
+        flag = next((word for word in words.split()[1:] if word.casefold() in ("y", "n")), "")
+        (fold,) = self._numbers(words.removesuffix(flag), "y", 1, 1, (1.0,))
+        if fold != int(fold) or not 1 <= fold <= _MOST_TEETH:
+            self.fail(f"a symmetry is a whole number from 1, not {fold:g}; y 8 y is that of a round brilliant")
+        return int(fold), flag.casefold() == "y"
+
+    def _index(self, words: str) -> float:
+        (index,) = self._numbers(words, "I", 1, 1, (1.54,))
+        if not _LEAST_INDEX < index <= _MOST_INDEX:
+            self.fail(f"a refractive index of {index:g} is none of a stone; I 1.54 is that of quartz")
+        return index
+
+    def _numbers(self, words: str, key: str, least: int, most: int, usual: tuple[float, ...]) -> list[float]:
+        """What stands behind `key`, filled up from `usual`."""
+        found = words.split()
+        if not least <= len(found) <= most or not all(map(_is_number, found)):
+            example = " ".join(f"{value:g}" for value in usual)
+            self.fail(f"'{words[:40]}' behind {key} is not understood; give numbers as in '{key} {example}'")
+        return [*map(float, found), *usual[len(found) :]]
+
+    def _tier(self, words: str) -> _OpenTier:
+        values = words.split(maxsplit=2)
+        if len(values) < 2 or not all(map(_is_number, values[:2])):
+            self.fail("a tier begins with its angle and distance; write it as in 'a 41.5 0.62 96 12 24'")
+        angle, distance = map(float, values[:2])
+        if not abs(angle) <= 90.0:
+            self.fail(f"an angle of {angle:g}° is none of a facet; angles run from -90 to 90")
+        if angle == 0.0 and distance < 0.0:  # how a culet is written
+            angle, distance = -0.0, -distance
+        if not 0.0 <= distance <= _FURTHEST:
+            self.fail(f"a distance of {distance:g} is none of a facet; give one from 0 to {_FURTHEST:g}")
+        tier = _OpenTier(self.line, angle, distance)
+        tier.take("".join(values[2:]), self.fail)
+        return tier
+
+    def design(self) -> FacetDesign:
+        """All of it. Raises `UserError`."""
+        name = self.path.name
+        if not self.is_begun:
+            raise UserError(f"{name}: the file is empty; save a design from GemCad as .asc")
+        if "g" not in self.values:
+            raise UserError(f"{name}: there is no gear (g); write 'g 96 0.0' in its second line")
+        gear, location = self.values["g"]
+        tiers = []
+        for tier in self.tiers:
+            self.line = tier.line
+            if not tier.indices and tier.angle_deg != 0.0:
+                self.fail("a tier without indices has no facets; list them behind its distance")
+            for index in tier.indices:
+                if not abs(index) <= abs(gear):
+                    self.fail(f"index {index:g} is beyond the gear's {abs(gear)} teeth; separate indices by blanks")
+            tiers.append(tier.closed())
+        if not 4 <= sum(len(tier.indices) for tier in tiers) <= MOST_FACETS:
+            raise UserError(
+                f"{name}: it has {sum(len(t.indices) for t in tiers)} facets; a stone has 4 to {MOST_FACETS}"
+            )
+        fold, is_mirrored = self.values.get("y", (1, False))
+        headers, footers = tuple(self.texts["h"]), tuple(self.texts["f"])
+        title = next(filter(None, headers), self.path.stem)
+        n_d = self.values.get("i")
+        return FacetDesign(title, tuple(tiers), gear, location, fold, is_mirrored, n_d, headers, footers)
+
+
+class _OpenTier:
+    """A tier to whose line others may be added."""
+
+    def __init__(self, line: int, angle_deg: float, distance: float) -> None:
+        self.line, self.angle_deg, self.distance = line, angle_deg, distance
+        self.indices: list[float] = []
+        self.names: dict[int, str] = {}
+        """By place among the indices, -1 before the first."""
+        self.instructions: list[str] = []
+        self._awaits_name = self._is_in_name = False
+
+    def take(self, words: str, fail: Callable[[str], NoReturn]) -> None:
+        """Indices, names behind `n` and, behind `G`, instructions."""
+        if self.instructions and words[:1] not in "gG":
+            if all(_is_number(word) for word in words.split()):
+                fail("numbers follow a cutting instruction (G); put a tier's indices before it")
+            self.instructions.append(words)
+            return
+        for word in (words_left := iter(words.split())):
+            place = len(self.indices) - 1
+            if self._awaits_name:
+                self.names[place], self._awaits_name, self._is_in_name = word, False, True
+            elif word in "nN":
+                self._awaits_name = True
+            elif word in "gG":
+                self.instructions.append(" ".join(words_left))
+            elif _is_number(word):
+                self.indices.append(float(word))
+                self._is_in_name = False
+            elif self._is_in_name:
+                self.names[place] += f" {word}"
+            else:
+                fail(f"'{word[:40]}' is no index; write a facet's name behind an n, instructions behind a G")
+
+    def closed(self) -> Tier:
+        """The tier; a table's one facet needs no index."""
+        indices = tuple(self.indices) or (0.0,)
+        names = tuple(self.names.get(i, self.names.get(-1, "") if i == 0 else "") for i in range(len(indices)))
+        instructions = " ".join(filter(None, self.instructions))
+        return Tier(self.angle_deg, self.distance, indices, names if any(names) else (), instructions)
+
+
+def _is_number(word: str) -> bool:
+    """Whether the first of its words is one."""
+    return bool(words := word.split()) and _NUMBER.fullmatch(words[0]) is not None
+
+
+def write_asc(design: FacetDesign, path: str | os.PathLike[str]) -> None:
+    """Write `design` to a text file of GemCad's, whole or not at all. Raises `UserError`."""
+    with atomic_output(path) as temporary:
+        temporary.write_bytes(asc_text(design).encode())
+
+
+def asc_text(design: FacetDesign) -> str:
+    """The text of its file, each tier one line; blanks in names are underscores."""
+    lines = ["GemCad 5.0", f"g {design.gear} {_decimal(design.location)}"]
+    lines.append(f"y {design.symmetry} {'y' if design.is_mirrored else 'n'}")
+    lines += [f"I {_decimal(design.n_d)}"] if design.n_d is not None else []
+    lines += [f"H {_one_line(text)}" for text in design.headers or (design.title,)]
+    for tier in design.tiers:
+        distance = -tier.distance if tier.angle_deg == 0.0 and tier.is_below else tier.distance
+        words = ["a", _decimal(tier.angle_deg), _decimal(distance)]
+        for index, name in zip(tier.indices, tier.names or ("",) * len(tier.indices), strict=True):
+            words += [_decimal(index).removesuffix(".0")]
+            words += ["n", "_".join(name.split())] if name.strip() else []
+        words += ["G", _one_line(tier.instructions)] if tier.instructions else []
+        lines.append(" ".join(words))
+    lines += [f"F {_one_line(text)}" for text in design.footers]
+    return "\r\n".join(lines) + "\r\n"
+
+
+def _decimal(value: float) -> str:
+    """Without exponent, and as exact as a float64 is."""
+    return np.format_float_positional(value, unique=True, trim="0")
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())
