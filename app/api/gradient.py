@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ..base.colour_maps import signed_codes
 from ..base.errors import UserError
 from ..base.generators import finished
 from ..base.image_io import save_codes
-from ..base.tone_map import luminance
+from ..commands.solving_table import GRADIENT_SIZE
 from .arguments import Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Floats
@@ -27,9 +28,6 @@ if TYPE_CHECKING:
     from ..gpu.context import Context
 
 T = TypeVar("T")
-DEFAULT_SIZE = (256, 256)
-_BRIGHTEST = 0.998
-"""Share of a picture whose colours are not full yet."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +56,7 @@ class Gradient:
     @property
     def codes(self) -> NDArray[np.uint8]:
         """uint8 (H, W, 3), sRGB, to look at: what becomes brighter is red, what becomes darker blue."""
-        change = luminance(self.rgb)
-        share = change / max(float(np.quantile(np.abs(change), _BRIGHTEST)), 1e-30)
-        left = 1.0 - np.sqrt(np.clip(np.abs(share), 0.0, 1.0))
-        up, down = np.where(share > 0.0, 1.0, left), np.where(share < 0.0, 1.0, left)
-        return np.round(255.0 * np.stack([up, left, down], axis=-1)).astype(np.uint8)
+        return signed_codes(self.rgb)
 
     def to_png(self, path: str | os.PathLike[str]) -> Path:
         """Write `codes`. Raises `UserError` where it cannot be written."""
@@ -101,7 +95,7 @@ def gradients(
     of: Sequence[str],
     receiver: str | None = None,
     *,
-    size: Size = DEFAULT_SIZE,
+    size: Size = GRADIENT_SIZE,
     photons: Count | None = None,
     seed: int | None = None,
     bins: int | None = None,
@@ -152,7 +146,7 @@ def gradient(
     of: str,
     receiver: str | None = None,
     *,
-    size: Size = DEFAULT_SIZE,
+    size: Size = GRADIENT_SIZE,
     photons: Count | None = None,
     seed: int | None = None,
     bins: int | None = None,

@@ -34,6 +34,7 @@ def match(
     target: ArrayLike | str | os.PathLike[str] | None = None,
     between: Places | None = None,
     *,
+    width: float | None = None,
     count: int = 10,
     photons: Count | None = None,
     seed: int | None = None,
@@ -46,35 +47,40 @@ def match(
     to 780 nm; linear Rec.709 in the same shapes with 3 in place of bins; one spectrum or colour (bins,) of a whole
     field; a picture file. None: the light of the scene as it is, for a `dispersion_gain` that nature does not offer.
     How bright it is does not count. `between`: two ends of a line on the receiver, or three corners of a field (where
-    its first row begins and ends, where its last row begins), world; not needed where `target` is None. Raises
-    `UserError`, also where the target says nothing about a glass or `cancel` stopped it.
+    its first row begins and ends, where its last row begins), world; not needed where `target` is None. `width`,
+    instead of `target`: full width at half maximum of the light along the line `between`, scene units.
+    Raises `UserError`, also where the target says nothing about a glass or `cancel` stopped it.
     """
     from ..render.light_target import glass_called
 
     check_scene(scene)
     index = glass_called(scene._model, through)
-    return _run(
-        scene, receiver, target, between, lambda solver: solver.match(index, count), photons, seed, progress, cancel
-    )
+    wish = scene, receiver, target, between, width
+    return _run(*wish, lambda solver: solver.match(index, count), photons, seed, progress, cancel)
 
 
 def fit(
     scene: Scene,
     of: Sequence[str],
     receiver: str,
-    target: ArrayLike | str | os.PathLike[str],
-    between: Places,
+    target: ArrayLike | str | os.PathLike[str] | None = None,
+    between: Places | None = None,
     *,
+    width: float | None = None,
     photons: Count | None = None,
     seed: int | None = None,
     progress: Progress | None = None,
     cancel: Cancel | None = None,
 ) -> Fit:
     """Values of the parameters `of` (paths as for `gradient`) with which `receiver` is lit as `target` says, from those
-    of the scene on; with their standard deviations by what is left over. The rest as for `match`."""
+    of the scene on; with their standard deviations by what is left over. The rest as for `match`; a
+    `width` fixes one parameter, and says nothing of its deviation (NaN)."""
+    if target is None and width is None:
+        raise UserError("there is nothing to fit to: give a target, or a width")
     if isinstance(of, str) or not of:
         raise UserError("of must be a list of paths, such as ['objects.prism.n_d']")
-    return _run(scene, receiver, target, between, lambda solver: solver.fit(list(of)), photons, seed, progress, cancel)
+    wish = scene, receiver, target, between, width
+    return _run(*wish, lambda solver: solver.fit(list(of)), photons, seed, progress, cancel)
 
 
 def _run(
@@ -82,6 +88,7 @@ def _run(
     receiver: str,
     target: ArrayLike | str | os.PathLike[str] | None,
     between: Places | None,
+    width: float | None,
     work: Callable[[Solver], Generator[float, None, T]],
     photons: Count | None,
     seed: int | None,
@@ -100,7 +107,7 @@ def _run(
 
         keep_programs(context.ctx)
         stage = Stage(model, model.camera)
-        return solved(solution(context, stage, settings, receiver, values, between, work), report, stopped)
+        return solved(solution(context, stage, settings, receiver, values, between, width, work), report, stopped)
 
     with Device() as device:
         return device.run(run, progress, cancel)

@@ -7,6 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from .tone_map import luminance
+
+_BRIGHTEST = 0.998
+"""Share of a signed picture whose colours are not full yet."""
+
 FALSE_COLOUR = np.array(
     [
         (0.190, 0.072, 0.232),
@@ -61,3 +66,12 @@ def sample(table: np.ndarray, position: np.ndarray | float) -> np.ndarray:
 def glsl_table(table: np.ndarray) -> str:
     """The table as a GLSL array expression, for a define."""
     return f"vec3[{len(table)}](" + ", ".join(f"vec3({r:.4f}, {g:.4f}, {b:.4f})" for r, g, b in table) + ")"
+
+
+def signed_codes(rgb: np.ndarray) -> np.ndarray:
+    """sRGB codes uint8 (H, W, 3) of a change (H, W, 3), linear Rec.709: what becomes brighter is red, darker blue."""
+    change = luminance(rgb)
+    share = change / max(float(np.quantile(np.abs(change), _BRIGHTEST)), 1e-30)
+    left = 1.0 - np.sqrt(np.clip(np.abs(share), 0.0, 1.0))
+    up, down = np.where(share > 0.0, 1.0, left), np.where(share < 0.0, 1.0, left)
+    return np.round(255.0 * np.stack([up, left, down], axis=-1)).astype(np.uint8)

@@ -72,7 +72,7 @@ def _page(options: Export) -> int:
     words = words_of(scene, find_scene(options.scene))
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         steps = page_steps(context, Stage(scene, scene.camera), settings, options.receiver, words)
-        page = _finished(steps, progress, "making the page", interrupted)
+        page = finished(steps, progress, "making the page", interrupted)
         if page is None:
             return interrupted.exit_code
         page.to_html(options.output)
@@ -82,19 +82,23 @@ def _page(options: Export) -> int:
     return 0
 
 
-def _finished(
-    steps: Generator[float, None, T], progress: Callable[[float, str], None], what: str, interrupted: Interruption
+def finished(
+    steps: Generator[float, None, T],
+    progress: Callable[[float, str], None],
+    what: str,
+    interrupted: Interruption,
+    stopped: str = "nothing was written: it is whole or not at all",
 ) -> T | None:
-    """What `steps` return; None, said to the user, where the work was interrupted."""
+    """What `steps` return; None, said to the user as `stopped`, where the work was interrupted."""
     while True:
         try:
             progress(next(steps), what)
-        except StopIteration as finished:
-            value: T = finished.value
+        except StopIteration as end:
+            value: T = end.value
             return value
         if interrupted():
             steps.close()
-            print("spectrasplat: nothing was written: it is whole or not at all", file=sys.stderr)
+            print(f"spectrasplat: {stopped}", file=sys.stderr)
             return None
 
 
@@ -119,7 +123,7 @@ def _baked(
     started = time.perf_counter()
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
         steps = bake.bake_map(context, Stage(scene, scene.camera), settings, options.receiver)
-        baked = _finished(steps, progress, "baking", interrupted)
+        baked = finished(steps, progress, "baking", interrupted)
         if baked is None:
             return interrupted.exit_code
     for notice in baked.notices:

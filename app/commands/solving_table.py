@@ -6,20 +6,43 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from . import completion, options
-from .options import MISSING, argument, option, shared, target
-from .table import A_LENGTH, PHOTONS, SEED, OpensScene, ReadsScenes
+from .options import MISSING, argument, option, setting, shared, target
+from .table import A_LENGTH, BINS, LINEAR, PHOTONS, SEED, SHOWN, SPP, OpensScene, ReadsScenes
+
+GRADIENT_SIZE = (256, 256)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Match(OpensScene):
-    """Rank the catalogue's glasses by how near the light that an object of each casts comes to what is wanted."""
+class Gradient(OpensScene):
+    """Write how the picture, or the light on a receiver, changes with a number of the scene."""
 
-    through: str = argument("OBJECT", "The object of glass.")
-    receiver: str = argument("RECEIVER", "The flat object that is lit.", complete=completion.receivers)
+    of: str = argument(
+        "PARAMETER", "As for animate, for example objects.prism.n_d; objects.prism.index is its whole curve."
+    )
+    output: Path = target("OUT", f"A picture, brighter red and darker blue: {SHOWN}; numbers: {LINEAR}.")
+    receiver: str | None = option(
+        "NAME", "Of the light on this object, not of the picture.", complete=completion.receivers
+    )
+    size: tuple[int, int] | None = setting("WxH", "Pixels; default: 256x256.", options.size, fields=("width", "height"))
+    photons: int | None = shared(PHOTONS)
+    spp: int | None = shared(SPP)
+    bins: int | None = shared(BINS)
+    seed: int | None = shared(SEED)
+    step: float | None = option(
+        "H",
+        "Change of the parameter to either side; default: so that the picture changes by about 3 %.",
+        options.number(lambda value: 0.0 < value < 1e9, "more than 0", " in the parameter's unit, for example 0.001"),
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wanted(OpensScene):
+    """Light that is wanted on a receiver."""
+
     target: Path | None = option(
         "FILE",
-        "The light that is wanted: a picture, or a .csv of spectra, a line a place, of 4 to 32 even bins from 380 to "
-        "780 nm; default: the scene's own light, for a dispersion gain that nature does not offer.",
+        "A picture, or a .csv of spectra, a line a place, of 4 to 32 even bins from 380 to 780 nm; default of match: "
+        "the scene's own light, for a dispersion gain that nature does not offer.",
     )
     begin: tuple[float, float, float] | None = option(
         "X,Y,Z", "Where the target's first row begins on the receiver (of a picture, its upper left).", options.place
@@ -28,9 +51,30 @@ class Match(OpensScene):
     last: tuple[float, float, float] | None = option(
         "X,Y,Z", "Where its last row begins; default: the target is a line.", options.place
     )
-    count: int | None = option("N", "Glasses that are listed; default: 10.", options.integer(1, 2000))
+    width: float | None = option(
+        "W",
+        "Width of the light along that line, instead of a target: full width at half maximum.",
+        options.number(lambda value: 0.0 < value < 1e9, "more than 0", A_LENGTH),
+    )
     photons: int | None = shared(PHOTONS)
     seed: int | None = shared(SEED)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Match(Wanted):
+    """Rank the catalogue's glasses by how near the light that an object of each casts comes to what is wanted."""
+
+    through: str = argument("OBJECT", "The object of glass.")
+    receiver: str = argument("RECEIVER", "The flat object that is lit.", complete=completion.receivers)
+    count: int | None = option("N", "Glasses that are listed; default: 10.", options.integer(1, 2000))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fit(Wanted):
+    """Find numbers of a scene with which it lights a receiver as is wanted, from those that it has."""
+
+    receiver: str = argument("RECEIVER", "The flat object that is lit.", complete=completion.receivers)
+    of: tuple[str, ...] = argument("PARAMETER...", "As for gradient; with a width one only.", repeated=True)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -44,7 +44,7 @@ def _either(*words: str) -> str:
     return f"{', '.join(words[:-1])} or {words[-1]}"
 
 
-_SHOWN, _LINEAR = ", ".join(OFFERED_SHOWN), _either(*OFFERED_LINEAR)
+SHOWN, LINEAR = ", ".join(OFFERED_SHOWN), _either(*OFFERED_LINEAR)
 _NOT_LINEAR = f"not of {' and '.join(OFFERED_LINEAR)}"
 _SPECTRAL = ", ".join(SPECTRAL_SUFFIXES)
 _FORMATS = tuple(suffix[1:] for suffix in (*OFFERED_SHOWN, *OFFERED_LINEAR))
@@ -81,6 +81,13 @@ _SCENE = Option(
 )
 _SIZE = Option("WxH", "Pixels; default: the scene's.", options.size, sets="settings", fields=("width", "height"))
 PHOTONS = Option("N", "Photons to emit; default: the scene's.", options.photons, sets="settings")
+SPP = Option("N", "Camera samples a pixel.", _spp, sets="settings")
+BINS = Option(
+    "N",
+    f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to {_SPECTRAL}).",
+    _bins,
+    sets="settings",
+)
 SEED = Option("K", "Seed of the random numbers; default: 1.", _seed, sets="settings")
 _METHOD = Option(
     "NAME",
@@ -170,7 +177,7 @@ class ByWorkers:
 class Render(OpensScene):
     """Render a scene to a picture file."""
 
-    output: Path = target("OUT", f"The picture: {_SHOWN} (to look at), {_LINEAR} (linear, to work on).")
+    output: Path = target("OUT", f"The picture: {SHOWN} (to look at), {LINEAR} (linear, to work on).")
     size: tuple[int, int] | None = setting(
         "WxH", "Pixels, for example 1920x1080; default: the scene's.", options.size, fields=("width", "height")
     )
@@ -180,9 +187,7 @@ class Render(OpensScene):
     method: str | None = shared(_METHOD)
     camera_method: str | None = shared(_CAMERA_METHOD)
     layer: str | None = setting("LAYER", "beauty (default), caustic, or map:RECEIVER.", complete=completion.layers)
-    bins: int | None = setting(
-        "N", f"Keep {options.MIN_BINS} to {options.MAX_BINS} spectral bins (written to {_SPECTRAL}).", _bins
-    )
+    bins: int | None = shared(BINS)
     exposure: float | None = setting(
         "EV", f"Stops brighter (or darker) than automatic; {_NOT_LINEAR}.", _exposure, fields=("exposure_ev",)
     )
@@ -208,7 +213,7 @@ class Render(OpensScene):
     max_depth: int | None = setting(
         "N", "Specular events on a light path, at most; default: 64.", options.integer(1, options.MAX_DEPTH)
     )
-    spp: int | None = setting("N", "Camera samples a pixel.", _spp)
+    spp: int | None = shared(SPP)
     batch: int | None = setting("N", "Photons in flight at once (never changes the picture).", options.batch)
     polarisation: bool | None = switch(
         "Light keeps its polarisation from surface to surface (default: as the scene has it).",
@@ -261,7 +266,7 @@ class Merge(ReadsScenes):
     parts: tuple[Path, ...] = argument(
         "PART.ssp...", "Parts that 'render --passes' wrote, or folders of them.", repeated=True
     )
-    output: Path = target("OUT", f"The picture: {_SHOWN}, {_LINEAR}; or .ssp, a part that holds them all.")
+    output: Path = target("OUT", f"The picture: {SHOWN}, {LINEAR}; or .ssp, a part that holds them all.")
     scene: str | None = option("SCENE", "The scene; default: the file that the parts were traced from.")
     exposure: float | None = option("EV", f"Stops brighter (or darker) than automatic; {_NOT_LINEAR}.", _exposure)
     partial: bool = switch("Make a noisier picture of the parts there are, where some are missing.")
@@ -395,7 +400,7 @@ class Bake(BakesCaustic):
     receiver: str = argument("RECEIVER", "The diffuse object whose caustic is baked.", complete=completion.receivers)
     output: Path = target(
         "OUT",
-        f"The texture: {_LINEAR} (linear irradiance), {_SHOWN} (to look at); where it is placed is written to a .json "
+        f"The texture: {LINEAR} (linear irradiance), {SHOWN} (to look at); where it is placed is written to a .json "
         "next to it.",
     )
 

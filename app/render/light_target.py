@@ -28,6 +28,8 @@ _PARTS = 3
 """Along a side of one cell of a target, between which its mean is taken."""
 _CELLS, _NARROW = 64, 32.0
 """Along a side of a target that is the scene as it is; length of a line over the breadth of its strip."""
+_WIDEST = 0.9
+"""Width over the line, at most."""
 
 
 @dataclass(frozen=True)
@@ -35,12 +37,16 @@ class Target:
     """Light that is wanted on a flat receiver."""
 
     receiver: str
+    axes: np.ndarray
+    """(2, 3), world, unit: along the rows and the columns of the receiver's map."""
     corners: np.ndarray
     """(3, 3), world: of the first row its beginning and its end, of the last row its beginning."""
     values: np.ndarray
     """(h, w, channels), in any unit."""
     bin_edges_nm: np.ndarray | None = None
     """(bins + 1,), of even bins from 380 to 780 nm; None: linear Rec.709."""
+    width: float | None = None
+    """Wanted instead of `values`, which are a line: see `solving.width_of`; as a share of the line."""
 
     def __post_init__(self) -> None:
         values, edges = self.values, self.bin_edges_nm
@@ -66,7 +72,7 @@ class Target:
 
     def settings(self, settings: RenderSettings) -> RenderSettings:
         """Of the maps."""
-        size = np.linalg.norm(self.corners[1:] - self.corners[0], axis=1)
+        size = np.ptp(self.window @ self.axes.T, axis=0)
         width, height = np.maximum(np.round(_TEXELS * size / size.max()), _FEWEST).astype(int)
         return replace(
             settings,
@@ -128,11 +134,15 @@ def flat_receiver(scene: Scene) -> str:
 
 def line(scene: Scene, receiver: str, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
     """Corners of a target that is a narrow strip about a line on a receiver."""
-    item = scene.objects[[item.name for item in scene.objects].index(receiver)]
-    axes = plane_frame(item.world_vertices).axes
     first, last = np.asarray(start, float), np.asarray(end, float)
-    across = np.cross(np.cross(*axes), last - first) / _NARROW
+    across = np.cross(np.cross(*axes_of(scene, receiver)), last - first) / _NARROW
     return np.stack([first - 0.5 * across, last - 0.5 * across, first + 0.5 * across])
+
+
+def axes_of(scene: Scene, receiver: str) -> np.ndarray:
+    """`Target.axes` of a flat receiver."""
+    item = scene.objects[[item.name for item in scene.objects].index(receiver)]
+    return plane_frame(item.world_vertices).axes
 
 
 def as_it_is(
@@ -140,7 +150,8 @@ def as_it_is(
 ) -> Generator[float, None, Target]:
     """The light that the scene casts on a receiver, all of it or what is within `corners`, as a target."""
     edges = np.linspace(380.0, 780.0, BINS + 1)
-    target = Target(receiver, np.eye(3) if corners is None else corners, np.ones((_CELLS, _CELLS, BINS)), edges)
+    axes = axes_of(stage.scene, receiver)
+    target = Target(receiver, axes, np.eye(3) if corners is None else corners, np.ones((_CELLS, _CELLS, BINS)), edges)
     settings, window = target.settings(settings), None if corners is None else target.window
     if corners is None:
         settings = replace(settings, width=_TEXELS, height=_TEXELS)
@@ -165,9 +176,10 @@ def wanted(
     receiver: str,
     values: np.ndarray | None,
     between: Sequence[Sequence[float]] | None,
+    width: float | None = None,
 ) -> Generator[float, None, Target]:
-    """The target of `values` (see `spectrasplat.match`), or the light as it is, on a line or a field of a receiver.
-    Raises `UserError`."""
+    """The target of `values` or `width` (see `spectrasplat.match`), or the light as it is, on a line or a field of a
+    receiver. Raises `UserError`."""
     scene = stage.scene
     if not scene.objects[[item.name for item in scene.objects].index(receiver)].mesh.is_flat:
         raise UserError(f"'{receiver}' is curved: light is compared on a flat receiver only, so name one")
@@ -177,6 +189,16 @@ def wanted(
         if points.shape not in ((2, 3), (3, 3)) or not np.isfinite(points).all() or np.ptp(points, axis=0).max() == 0.0:
             raise UserError("the target's place is given by two ends of a line or three corners, three numbers each")
         corners = points if len(points) == 3 else line(scene, receiver, *points)
+    if width is not None:
+        if values is not None or between is None or len(between) != 2 or corners is None:
+            raise UserError("a width is measured along a line, without another target: give the line's two ends")
+        length = float(np.linalg.norm(np.subtract(*np.asarray(between, float))))
+        if not 0.0 < width < _WIDEST * length:
+            raise UserError(
+                f"a width of {width:g} does not fit on a line {length:g} long: give more than 0 and less than "
+                f"{_WIDEST * length:.4g}, or a longer line"
+            )
+        return Target(receiver, axes_of(scene, receiver), corners, np.ones((1, _TEXELS, 3)), width=width / length)
     if values is None:
         return (yield from as_it_is(context, stage, settings, receiver, corners))
     if corners is None:
@@ -189,7 +211,8 @@ def wanted(
     bins = cells.shape[-1]
     if bins != 3 and not 4 <= bins <= 32:
         raise UserError(f"a target of {bins} channels is none: give 3 (linear Rec.709) or 4 to 32 spectral bins")
-    return Target(receiver, corners, cells, None if bins == 3 else np.linspace(380.0, 780.0, bins + 1))
+    edges = None if bins == 3 else np.linspace(380.0, 780.0, bins + 1)
+    return Target(receiver, axes_of(scene, receiver), corners, cells, edges)
 
 
 def read_target(path: Path) -> np.ndarray:

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..base.generators import mapped
+from ..base.tone_map import luminance
 from ..edit.glass import set_dispersion
 from ..edit.parameters import Stage, value_of
 from ..edit.solved import Fit, Match, Ranked
@@ -34,12 +35,19 @@ _SCANNED, _LEVELS, _TRIED = 20, 6, 1 << 15
 _NEAR, _LIT, _HARDLY = 0.3, 0.6, 0.95
 """What their blurred light may differ by, of the scene's own glass, of one of some and of one of many, to begin with
 it."""
+_ALIKE = 0.01
+"""The same of a width, which glasses of any n_d may have."""
 _BLURS = (0.12, 0.04, 0.0)
 """Standard deviations, of the target's longer side."""
 _STEPS = 8
 """With each blur, at most."""
 _TRUST = 0.5
 """Largest change, as a share of the picture's norm, that a linear prediction is believed."""
+_NO_COLOURS = (
+    "the target says nothing about a glass, for no dispersed light falls there: give a place where colours spread"
+)
+_AT_ENDS = 0.5
+"""Light at a line's end over the brightest on it, from which on its width is not that of the light."""
 _SAYS_NOTHING = 1e-3
 """Share of the picture's norm that five Abbe numbers must change."""
 
@@ -62,13 +70,15 @@ class Solver:
         """Gauss and Newton's method from the scene as it is, pausing with the share done."""
         at, taken, error = np.zeros(len(paths)), 0, np.inf
         found: tuple[np.ndarray, np.ndarray, float] | None = None
-        for number, blur in enumerate(_BLURS):
+        if self.target.width is not None and len(paths) > 1:
+            raise UserError("a width fixes one number only: give one parameter")
+        for number, blur in enumerate(self._blurs):
             for step in range(_STEPS):
-                begun = (number + step / _STEPS) / len(_BLURS)
+                begun = (number + step / _STEPS) / len(self._blurs)
                 columns = yield from mapped(
-                    self._columns(at, paths, blur), partial(_within, begun, 1.0 / (len(_BLURS) * _STEPS))
+                    self._columns(at, paths, blur), partial(_within, begun, 1.0 / (len(self._blurs) * _STEPS))
                 )
-                move, covariance, error = _least_squares(columns, self._wanted(blur))
+                move, covariance, error = self._solved(columns, blur)
                 taken += 1
                 size = float(np.linalg.norm(columns[:, 1:] @ move) / np.linalg.norm(columns[:, 0]))
                 at = at + move * min(1.0, _TRUST / max(size, 1e-12))
@@ -76,6 +86,7 @@ class Solver:
                 if size < 1e-3 or (blur and size < 0.05):
                     break
         assert found is not None
+        self._check_ends(columns)
         at, covariance, error = found
         start = {path: 0.0 if path.endswith(f".{INDEX}") else value_of(self.stage, path) for path in paths}
         values = {path: start[path] + float(change) for path, change in zip(paths, at, strict=True)}
@@ -102,7 +113,7 @@ class Solver:
         known: dict[str, Gradient] = {}
         names = [entry.qualified_name for entry in entries]
         best, errors, columns = start, np.zeros(0), np.zeros((0, 0))
-        for blur in _BLURS:
+        for blur in self._blurs:
             seen: set[int] = set()
             while best not in seen and len(seen) < _STEPS:
                 seen.add(best)
@@ -115,10 +126,11 @@ class Solver:
                 columns = self._by_bin(known[names[best]], blur)
                 if not errors.size:
                     self._check(columns, entries[best].dispersion)
-                errors = _errors(columns, self._wanted(blur), curves - curves[best])
+                errors = self._errors(columns, curves - curves[best], blur)
                 last, best = best, int(np.argmin(errors))
             best = last if len(seen) == _STEPS else best
-        order = np.argsort(errors, kind="stable")[:count]
+        self._check_ends(columns)
+        order = np.argsort(errors, kind="stable")[: min(count, int(np.isfinite(errors).sum()))]
         ranked = tuple(
             Ranked(names[i], entries[i].dispersion.n_d, entries[i].dispersion.V_d, float(errors[i])) for i in order
         )
@@ -149,7 +161,8 @@ class Solver:
             )
             errors |= dict(zip(fresh, found, strict=True))
             best = min(errors, key=errors.__getitem__)
-            if errors[best] < (_NEAR if not level else _LIT if level + 1 < _LEVELS else _HARDLY):
+            near = _NEAR if self.target.width is None else _ALIKE
+            if errors[best] < (near if not level else _LIT if level + 1 < _LEVELS else _HARDLY):
                 return best
         raise UserError("no glass of the catalogue casts such light there: is the target's place right, and its scene?")
 
@@ -164,8 +177,8 @@ class Solver:
             for number, stage in enumerate(stages):
                 for share in renderer.steps(stage):
                     yield (number + share) / len(stages)
-                shown = self._colours(renderer.picture, placement(renderer.light), _BLURS[0]).ravel()
-                errors.append(float(_errors(shown[:, None], self._wanted(_BLURS[0]), np.zeros((1, 0)))[0]))
+                shown = self._colours(renderer.picture, placement(renderer.light), self._blurs[0]).ravel()
+                errors.append(float(self._errors(shown[:, None], np.zeros((1, 0)), _BLURS[0])[0]))
         finally:
             renderer.release()
         return errors
@@ -184,20 +197,26 @@ class Solver:
     def _check(self, columns: np.ndarray, dispersion: Dispersion) -> None:
         """Raise `UserError` where another dispersion would look the same."""
         shapes = _shapes(dispersion, self._edges)
+        if self.target.width is not None:
+            found, turned = self._widths(columns, np.stack([np.zeros_like(shapes[1]), 5.0 * shapes[1]]))
+            if not abs(turned - found) > _SAYS_NOTHING * found:
+                raise UserError(_NO_COLOURS)
+            return
         others = np.stack([columns[:, 0], columns[:, 1:] @ shapes[0]], axis=1)
         moved = 5.0 * columns[:, 1:] @ shapes[1]
         rest = moved - others @ np.linalg.lstsq(others, moved, rcond=None)[0]
         if not np.linalg.norm(rest) > _SAYS_NOTHING * np.linalg.norm(columns[:, 0]):
-            raise UserError(
-                "the target says nothing about a glass, for no dispersed light falls there: give a place where "
-                "colours spread"
-            )
+            raise UserError(_NO_COLOURS)
 
     def _around(self, columns: np.ndarray, dispersion: Dispersion) -> Fit:
         """n_d and V_d near those of a glass."""
         shapes = _shapes(dispersion, self._edges)
         both = np.stack([columns[:, 0], *(columns[:, 1:] @ shape for shape in shapes)], axis=1)
-        move, covariance, error = _least_squares(both, self._wanted(0.0))
+        if self.target.width is not None:  # which n_d, it does not say
+            move, covariance, error = self._solved(both[:, ::2], 0.0)
+            move, covariance = np.append(0.0, move), np.full((2, 2), np.nan)
+        else:
+            move, covariance, error = self._solved(both, 0.0)
         values = {"n_d": dispersion.n_d + float(move[0]), "V_d": dispersion.V_d + float(move[1])}
         deviations = dict(zip(values, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         return Fit(values, deviations, covariance, error, 1)
@@ -228,6 +247,47 @@ class Solver:
             cells = Channels(tuple(self._edges.tolist())).to_rgb709(cells).astype(float)
         return _blurred(cells, blur)
 
+    # ---- what is compared --------------------------------------------------------------------
+
+    @property
+    def _blurs(self) -> tuple[float, ...]:
+        return _BLURS if self.target.width is None else (0.0,)
+
+    def _errors(self, columns: np.ndarray, moves: np.ndarray, blur: float) -> np.ndarray:
+        """Of `moves` (m, k): see `_errors`; of a width what it differs by, relative."""
+        if self.target.width is None:
+            return _errors(columns, self._wanted(blur), moves)
+        found = self._widths(columns, moves)
+        size = np.linalg.norm(columns[:, 1:] @ moves.T, axis=0)
+        believed = np.isfinite(found) & (size <= _TRUST * np.linalg.norm(columns[:, 0]))
+        return np.where(believed, np.abs(found / self.target.width - 1.0), np.inf)
+
+    def _widths(self, columns: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """Widths of the light moved by `moves` (m, k), as shares of the line."""
+        light = columns[:, :1] + columns[:, 1:] @ moves.T
+        return width_of(luminance(light.T.reshape(len(moves), -1, 3)))
+
+    def _check_ends(self, columns: np.ndarray) -> None:
+        """Raise `UserError` where a width is that of the line, not of the light."""
+        if self.target.width is None:
+            return
+        light = luminance(columns[:, 0].reshape(-1, 3))
+        if light[[0, -1]].max() > _AT_ENDS * light.max():
+            raise UserError("light reaches an end of that line, which cuts its width: give a line that holds it all")
+
+    def _solved(self, columns: np.ndarray, blur: float) -> tuple[np.ndarray, np.ndarray, float]:
+        """See `_least_squares`; of a width the one move that makes it, whose variance is not known."""
+        if self.target.width is None:
+            return _least_squares(columns, self._wanted(blur))
+        h = 1e-2 * np.linalg.norm(columns[:, 0]) / max(float(np.linalg.norm(columns[:, 1])), 1e-300)
+        low, found, high = self._widths(columns, np.array([[-h], [0.0], [h]]))
+        if not abs(high - low) > 1e-9:
+            length = float(np.linalg.norm(self.target.corners[1] - self.target.corners[0]))
+            stays = f"stays {length * found:.4g}" if np.isfinite(found) else "is not known, for no light falls there"
+            raise UserError(f"no such width was found: on that line it {stays}, whatever changes")
+        move = np.array([(self.target.width - found) * 2.0 * h / (high - low)])
+        return move, np.full((1, 1), np.nan), abs(float(found) / self.target.width - 1.0)
+
     def _wanted(self, blur: float) -> np.ndarray:
         return _blurred(self.target.values.astype(float), blur).ravel()
 
@@ -239,12 +299,29 @@ def solution(
     receiver: str,
     values: np.ndarray | None,
     between: Sequence[Sequence[float]] | None,
+    width: float | None,
     work: Callable[[Solver], Generator[float, None, T]],
 ) -> Generator[float, None, T]:
     """What `work` finds for the target that `wanted` makes of the rest, pausing with the share done."""
-    target = yield from mapped(wanted(context, stage, settings, receiver, values, between), partial(_within, 0.0, 0.05))
+    its = wanted(context, stage, settings, receiver, values, between, width)
+    target = yield from mapped(its, partial(_within, 0.0, 0.05))
     steps = work(Solver(context, stage, settings, target))
     return (yield from mapped(steps, partial(_within, 0.05, 0.95)))
+
+
+def width_of(light: np.ndarray) -> np.ndarray:
+    """Full width at half maximum (m,) of the light (m, cells) along lines, as a share of the line: between the
+    outermost places that are half as bright as the brightest; NaN where no light is."""
+    found = np.full(len(light), np.nan)
+    for row, its in enumerate(np.pad(light, ((0, 0), (1, 1)))):
+        half = 0.5 * its.max()
+        if half > 0.0:
+            lit = np.flatnonzero(its >= half)
+            first, last = lit[0], lit[-1]
+            before = (its[first] - half) / (its[first] - its[first - 1])
+            after = (its[last] - half) / (its[last] - its[last + 1])
+            found[row] = (last - first + before + after) / light.shape[1]
+    return found
 
 
 def _within(begun: float, part: float, share: float) -> float:

@@ -259,7 +259,7 @@ def _matched(context: Context, request: requests.MatchGlass, state: State, threa
 
     def work() -> Iterator[float]:
         found = yield from solution(
-            context, stage, settings, receiver, None, None, lambda solver: solver.match(request.index, 3)
+            context, stage, settings, receiver, None, None, None, lambda solver: solver.match(request.index, 3)
         )
         near = (
             f"{g.name} (n_d {g.n_d:.4f}, V_d {g.V_d:.1f}) differs by {100.0 * g.error:.2g} %" for g in found.glasses

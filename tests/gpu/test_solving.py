@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import spectrasplat as ss
+from spectrasplat.base.tone_map import luminance
+from spectrasplat.edit.parameters import Stage
 from spectrasplat.model.optics import catalogue
+from spectrasplat.model.settings import RenderSettings
+from spectrasplat.render.frames import FrameRenderer
 from spectrasplat.render.light_target import Target
-from spectrasplat.render.solving import _at_bins, _errors, _least_squares
+from spectrasplat.render.solving import _at_bins, _errors, _least_squares, width_of
 
 EDGES = np.linspace(380.0, 780.0, 17)
 
@@ -49,8 +55,11 @@ def test_a_target_reads_the_map_where_it_lies() -> None:
     spectral = np.stack([x, y, x + y, 2.0 * x], axis=-1)
     placement = {"corners_world": {"bottom_left": [0, 0, 1], "bottom_right": [1, 0, 1], "top_left": [0, 1, 1]}}
     corners = np.array([[0.2, 0.3, 1.0], [0.6, 0.4, 1.0], [0.1, 0.7, 1.0]])
-    target = Target("floor", corners, np.ones((2, 4, 4)), np.linspace(380.0, 780.0, 5))
+    target = Target("floor", np.eye(3)[:2], corners, np.ones((2, 4, 4)), np.linspace(380.0, 780.0, 5))
     seen = target.seen(spectral, placement)
+    upright = replace(target, corners=np.array([[0.2, 0.1, 1.0], [0.2, 0.9, 1.0], [0.3, 0.1, 1.0]]))
+    its = upright.settings(RenderSettings())
+    assert (its.width, its.height) == (24, 192)  # along the map's axes, however the target's rows lie
     first = corners[0] + 0.125 * (corners[1] - corners[0]) + 0.25 * (corners[2] - corners[0])
     assert seen[0, 0] == pytest.approx([first[0], first[1], first[0] + first[1], 2.0 * first[0]], abs=1e-9)
 
@@ -71,6 +80,12 @@ def test_what_is_no_target_is_refused(tmp_path: Path) -> None:
         ss.match(scene, "prism", "screen", np.ones((4, 16)))
     with pytest.raises(ss.UserError, match="dark"):
         ss.match(scene, "prism", "screen", np.zeros((4, 16)), ends)
+    with pytest.raises(ss.UserError, match="nothing to fit to"):
+        ss.fit(scene, ["objects.prism.n_d"], "screen")
+    with pytest.raises(ss.UserError, match="the line's two ends"):
+        ss.match(scene, "prism", "screen", width=0.1)
+    with pytest.raises(ss.UserError, match="does not fit on a line 0.36"):
+        ss.match(scene, "prism", "screen", between=ends, width=0.35)
     with pytest.raises(ss.UserError, match="a target of 2 channels"):
         ss.match(scene, "prism", "screen", np.ones((4, 2)), ends)
     (tmp_path / "lines.csv").write_text("1,2,3,4\n1,2,x,4\n")
@@ -107,6 +122,38 @@ def test_numbers_are_fitted_through_noise() -> None:
     for path, wanted, blur in zip(paths, (1.70, 30.0, 0.0), (2e-4, 0.05, 0.05), strict=True):
         assert 0.0 < found.deviations[path] < blur
         assert abs(found.values[path] - wanted) < 4.0 * found.deviations[path] + blur
+
+
+def test_a_width_is_that_of_what_lies_on_the_line() -> None:
+    """Full width at half maximum: of a bell 2.355 deviations, wherever it lies and whatever is dim beside it; all of a
+    line that is even; none in the dark."""
+    t = (np.arange(400) + 0.5) / 400.0
+    found = width_of(np.stack([np.exp(-0.5 * ((t - 0.4) / 0.05) ** 2) + 0.02 * (t > 0.9), np.ones(400), np.zeros(400)]))
+    assert found[:2] == pytest.approx([2.0 * math.sqrt(2.0 * math.log(2.0)) * 0.05, 1.0], rel=3e-3)
+    assert np.isnan(found[2])
+
+
+@pytest.mark.slow
+def test_a_width_is_fitted_and_matched(gl) -> None:
+    """The Abbe number of a glass of this n_d is that of the spectrum so wide; a glass of the catalogue has it too."""
+    true = ss.load("spectrum")
+    true.objects["prism"].update(glass=None, material={"n_d": 1.80, "V_d": 20.0})
+    line = [[3.5009, 0.0, -1.95945], [4.00595, 0.0, -0.871475]]
+    window = np.array([[3.5009, -0.02, -1.95945], [4.00595, 0.02, -0.871475]])
+    its = RenderSettings(width=8, height=1200, photons=60_000, seed=3, layer="map:screen")
+    frames = FrameRenderer(gl, its, [Stage(true._model, true._model.camera)], window=window)
+    seen = frames.run(Stage(true._model, true._model.camera)).astype(float)
+    frames.release()
+    light = luminance(seen)[:, 3:5].mean(axis=1)
+    width = float(width_of(light[None])[0]) * float(np.linalg.norm(np.subtract(*line)))
+    start = true.copy()
+    start.objects["prism"].update(material={"n_d": 1.80, "V_d": 24.0})
+    found = ss.fit(start, ["objects.prism.V_d"], "screen", between=line, width=width, photons=30_000)
+    assert found.values["objects.prism.V_d"] == pytest.approx(20.0, abs=0.8)
+    near = ss.match(start, "prism", "screen", between=line, width=width, photons=30_000, count=3)
+    assert near.glasses[0].error < 0.1 and 18.0 < near.fit.values["V_d"] < 26.0
+    with pytest.raises(ss.UserError, match="one number only"):
+        ss.fit(start, ["objects.prism.V_d", "objects.prism.n_d"], "screen", between=line, width=width)
 
 
 @pytest.mark.slow

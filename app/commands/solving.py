@@ -1,0 +1,137 @@
+"""The commands that solve: derivatives, which glass casts the light that is wanted, and which numbers of a scene."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Generator
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
+
+from ..base.errors import UserError
+from ..base.interrupts import INTERRUPTED, interrupt_flag
+from .bake import finished
+from .opened import note_assumptions, open_scene, settings_for
+from .printing import note, show
+from .solving_table import GRADIENT_SIZE, Fit, Gradient, Match, Wanted
+
+if TYPE_CHECKING:
+    from ..gpu.context import Context
+    from ..model.scene import Scene
+    from ..render.solving import Solver
+
+T = TypeVar("T")
+_NO_ANSWER = "stopped before there was an answer"
+
+
+def gradient(options: Gradient) -> int:
+    """Write a derivative as a picture; returns the exit code. Raises `UserError`."""
+    from ..base.atomic import check_writable
+    from ..base.colour_maps import signed_codes
+    from ..base.image_io import SHOWN_SUFFIXES, SPECTRAL_SUFFIXES, check_suffix, save_codes, write_image
+    from ..edit.parameters import Stage
+    from ..render.bake import check_receiver
+    from ..render.gradient import check_path
+    from ..render.gradient import gradient as derived
+
+    is_shown = check_suffix(options.output) in SHOWN_SUFFIXES
+    if options.bins is not None and options.output.suffix.lower() not in SPECTRAL_SUFFIXES:
+        note(f"--bins: a {options.output.suffix} file holds no spectral channels; write an .exr to keep them")
+    check_writable(options.output)
+    scene = open_scene(options)
+    stage = Stage(scene, scene.camera)
+    check_path(stage, options.of)
+    if options.receiver is not None:
+        check_receiver(scene, options.receiver)
+    note_assumptions(scene)
+    settings = settings_for(options, scene, width=GRADIENT_SIZE[0], height=GRADIENT_SIZE[1])
+    if options.receiver is not None:
+        settings = replace(settings, layer=f"map:{options.receiver}")
+    steps = None if options.step is None else {options.of: options.step}
+    started = time.perf_counter()
+    found = _run(scene, "deriving", lambda context: derived(context, stage, settings, [options.of], steps))
+    if found is None:
+        return INTERRUPTED
+    its = found.derivatives[0]
+    if is_shown:
+        save_codes(options.output, signed_codes(its.picture.rgb))
+    else:
+        write_image(
+            options.output, its.picture.rgb, spectral=its.picture.spectral, bin_edges_nm=its.picture.bin_edges_nm
+        )
+    took = time.perf_counter() - started
+    show(f"{options.output.resolve()}: derivative by {its.path}, step {its.step:.3g} to either side, in {took:.1f} s")
+    return 0
+
+
+def match(options: Match) -> int:
+    """Rank and list glasses; returns the exit code. Raises `UserError`."""
+    from ..render import light_target
+
+    scene = open_scene(options)
+    index, count = light_target.glass_called(scene, options.through), options.count or 10
+    started = time.perf_counter()
+    found = _solved(options, scene, options.receiver, "comparing glasses", lambda its: its.match(index, count))
+    if found is None:
+        return INTERRUPTED
+    show(f"{'glass':<28} {'n_d':>9} {'V_d':>7}  differs by")
+    for each in found.glasses:
+        show(f"{each.name:<28} {each.n_d:9.5f} {each.V_d:7.2f}  {100.0 * each.error:.3g} %")
+    (n_d, v_d), (n_d_sd, v_d_sd) = found.fit.values.values(), found.fit.deviations.values()
+    if options.width is None:
+        show(f"without a name: n_d {n_d:.6f} ± {n_d_sd:.1g}, V_d {v_d:.3f} ± {v_d_sd:.1g}")
+    else:
+        show(f"without a name: V_d {v_d:.3f} at n_d {n_d:.5f}; glasses of quite another n_d were not compared")
+    show(f"in {time.perf_counter() - started:.1f} s")
+    return 0
+
+
+def fit(options: Fit) -> int:
+    """Find and show numbers of a scene; returns the exit code. Raises `UserError`."""
+    if options.target is None and options.width is None:
+        raise UserError("there is nothing to fit to: give --target or --width")
+    scene = open_scene(options)
+    started = time.perf_counter()
+    found = _solved(options, scene, options.receiver, "fitting", lambda its: its.fit(options.of))
+    if found is None:
+        return INTERRUPTED
+    for path, value in found.values.items():
+        deviation = "" if options.width is not None else f" ± {found.deviations[path]:.1g}"
+        show(f"{path} {value:.6g}{deviation}")
+    took = time.perf_counter() - started
+    show(f"what is left differs by {100.0 * found.error:.3g} %; {found.steps} steps in {took:.1f} s")
+    return 0
+
+
+def _solved(
+    options: Wanted, scene: Scene, receiver: str, what: str, work: Callable[[Solver], Generator[float, None, T]]
+) -> T | None:
+    """What `work` finds for the target of `options`; None where it was interrupted. Raises `UserError`."""
+    from ..edit.parameters import Stage
+    from ..gpu.shader import keep_programs
+    from ..render import light_target
+    from ..render.bake import check_receiver
+    from ..render.solving import solution
+
+    check_receiver(scene, receiver)
+    ends = [options.begin, options.end, options.last]
+    between = [place for place in ends if place is not None]
+    if between and (options.begin is None or options.end is None):
+        raise UserError("--begin and --end go together: give both, where the target's first row begins and ends")
+    values = None if options.target is None else light_target.read_target(options.target)
+    note_assumptions(scene)
+    settings = settings_for(options, scene)
+
+    def steps(context: Context) -> Generator[float, None, T]:
+        keep_programs(context.ctx)
+        wish = receiver, values, between or None, options.width
+        return (yield from solution(context, Stage(scene, scene.camera), settings, *wish, work))
+
+    return _run(scene, what, steps)
+
+
+def _run(scene: Scene, what: str, steps: Callable[[Context], Generator[float, None, T]]) -> T | None:
+    from ..base.progress import ProgressReporter
+    from ..gpu.context import create_context
+
+    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        return finished(steps(context), progress, what, interrupted, _NO_ANSWER)
