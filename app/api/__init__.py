@@ -15,6 +15,7 @@ from ..edit.stored_photons import StoredPhotons as Photons
 from ..model.optics.lens_design import LensTable
 from ..model.plate_check import PlateReport
 from .catalogue import Glass, glass, glasses
+from .gems import GemFigures, GemReport, gem
 from .gradient import Gradient, gradient, gradients
 from .lenses import lens_check, lens_table
 from .pages import page
@@ -33,6 +34,8 @@ __all__ = [
     "Entries",
     "Fan",
     "Fit",
+    "GemFigures",
+    "GemReport",
     "Glass",
     "Gradient",
     "LensTable",
@@ -51,6 +54,7 @@ __all__ = [
     "caustic",
     "fan",
     "fit",
+    "gem",
     "glass",
     "glasses",
     "gradient",

@@ -33,6 +33,7 @@ COMMANDS = {
     "gallery": ("table:Gallery", "gallery:gallery"),
     "inspect": ("table:Inspect", "inspect_report:inspect"),
     "glass": ("table:Glass", "glass:glass"),
+    "gem": ("solving_table:Gem", "gem:gem"),
     "lens table": ("solving_table:LensTable", "lens:lens_table"),
     "lens check": ("solving_table:LensCheck", "lens:lens_check"),
     "doctor": ("table:Doctor", "doctor:doctor"),

@@ -1,4 +1,4 @@
-"""The commands that solve and that give figures of lenses, with their options: see `table`."""
+"""The commands that solve and that give figures of lenses and gems, with their options: see `table`."""
 
 from __future__ import annotations
 
@@ -75,6 +75,34 @@ class Fit(Wanted):
 
     receiver: str = argument("RECEIVER", "The flat object that is lit.", complete=completion.receivers)
     of: tuple[str, ...] = argument("PARAMETER...", "As for gradient; with a width one only.", repeated=True)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Gem(ReadsScenes):
+    """Show what a cut stone looks like from above: light return, fire, scintillation, windows; ASET, tilt curves."""
+
+    stone: str = argument(
+        "STONE", "A GemCad design (.asc), a mesh (.stl, .ply, .obj) or a scene.", complete=completion.scenes
+    )
+    object: str | None = option("NAME", "Which object of the scene; default: its first solid of glass.")
+    glass: str | None = option(
+        "GLASS",
+        "What it is cut of: a glass, or an index, which has no fire; default: what the scene says.",
+        complete=completion.glasses,
+    )
+    up: str = option("AXIS", "Where its table faces: z, -z, x, -x, y or -y of the file; default: z.", default="z")
+    head: float = option(
+        "DEG",
+        "Half the angle at which the viewer's head hides light; default: 15.",
+        options.number(lambda value: 0.0 <= value <= 60.0, "from 0 to 60", " degrees, for example 16"),
+        default=15.0,
+    )
+    output: Path | None = target(
+        "OUT", "Write a report (.html), the figures and curves (.json) or a picture (.png).", default=None
+    )
+    picture: str = option(
+        "NAME", "Which picture: aset, ideal-scope, brightness or fire; default: aset.", default="aset"
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -102,6 +102,7 @@ class Panels:
     history: bool = False
     rays: bool = False
     lens: bool = False
+    gem: bool = False
     lesson: bool = False
     shortcuts: bool = False
     start_page: bool = False

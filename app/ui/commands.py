@@ -323,6 +323,7 @@ PANELS = _group(
     _panel("Spectrum", "", "spectrum", "The spectrum under the cursor."),
     _panel("Compare", "", "compare", "Reference, wipe, error map."),
     _panel("Lens", "", "lens", "Focal lengths, chromatic shift and spots of the selected lens, by wavelength."),
+    _panel("Gem", "", "gem", "Light return, fire, scintillation and windows of the selected stone, face up."),
     _panel("Rays", "", "rays", "Deviation and focal length of the ray overlay, by wavelength."),
     _panel("Lesson", "", "lesson", "Six lessons: a scene each, a few sentences, what to try."),
     _panel("History", "", "history", "All steps that can be undone."),

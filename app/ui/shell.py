@@ -15,6 +15,7 @@ from . import item_rects, layout, shortcuts, theme
 from .layout import Place
 from .panels import (
     dialogs,
+    gem_panel,
     help_list,
     history_panel,
     inspector,
@@ -68,6 +69,7 @@ WINDOWS = (
     PanelWindow("export", "Export", "right bottom if tall", draw_export, (26.0, 30.0)),
     PanelWindow("rays", "Rays", "bottom", rays_panel.draw_rays_panel),
     PanelWindow("lens", "Lens", "bottom", lens_panel.draw_lens_panel),
+    PanelWindow("gem", "Gem", "bottom", gem_panel.draw_gem_panel),
     PanelWindow("timing", "Timing", "bottom", timing.draw_timing),
     PanelWindow("spectrum", "Spectrum", "bottom", spectrum.draw_spectrum),
     PanelWindow("compare", "Compare", "bottom", draw_compare),

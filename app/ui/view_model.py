@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..base.not_yet import NOT_YET
 from ..edit.autosave import Recovery
 from ..edit.history import HistoryEntry
 from ..edit.picking import PickHit
@@ -14,6 +15,7 @@ from ..model.scene import Scene, Vec3
 from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
+from .gem_thread import GemReading
 from .ray_readings import RayReading
 
 
@@ -134,6 +136,8 @@ class ViewModel:
     rays: tuple[RayLine, ...] = ()
     readings: tuple[RayReading, ...] = ()
     """What those rays say in numbers."""
+    gem: GemReading = NOT_YET
+    """Of the selected stone, while its panel is open."""
     job: JobInfo | None = None
     engine_rests: bool = False
     """The job has all of the time: it is waited for."""

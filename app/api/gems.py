@@ -1,0 +1,60 @@
+"""Cut stones and their figures."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+from ..base.errors import UserError
+from ..commands.gem import glass_called, on_table, stone_at
+from ..commands.scenes import find_scene
+from ..model.gem_scene import stone_in
+from ..model.optics.gem_figures import ASET_HEAD_DEG, GemFigures
+from ..model.optics.gem_report import GemReport, gem_report
+from .device import Cancel, Device, Progress
+from .scene import Scene
+
+__all__ = ["GemFigures", "GemReport", "gem"]
+
+
+def gem(
+    source: Scene | str | os.PathLike[str],
+    object: str | None = None,
+    *,
+    glass: str | float | None = None,
+    up: str = "z",
+    head_deg: float = ASET_HEAD_DEG,
+    table: bool = False,
+    progress: Progress | None = None,
+    cancel: Cancel | None = None,
+) -> GemReport:
+    """What a cut stone looks like from above: light return, fire, scintillation, tilt curves, ASET and ideal-scope.
+
+    The stone is `object` of a scene, or its first solid of glass; `source` is the scene or a file. `glass`: another
+    than its own, or an index without dispersion. `up`: where its table faces, an axis of its own coordinates.
+    `head_deg`: half the angle at which the viewer's head hides light. `table`: the light that it throws on a table as
+    well, which needs OpenGL. `cancel`: what is missing then is NaN or left out. Raises `UserError`, also where it was
+    cancelled before there was a figure.
+    """
+    if not 0.0 <= head_deg <= 60.0:
+        raise UserError(f"head_deg is {head_deg:g}; give an angle from 0 to 60 degrees")
+    made_of = None if glass is None else str(glass)
+    if isinstance(source, Scene):
+        found_glass = None if made_of is None else glass_called(made_of, Path(), [])
+        stone = stone_in(source._model, object, found_glass, up)
+    else:
+        stone = stone_at(find_scene(os.fspath(source)), object, made_of, up)
+    told, share = progress or (lambda done, text: None), 0.6 if table else 1.0
+    found = gem_report(stone, head_deg, lambda done, text: told(share * done, text), cancel)
+    if found is None:
+        raise UserError("it was cancelled before there was a figure")
+    if not table or (cancel is not None and cancel()):
+        return found
+    with Device() as device:
+        thrown = device.run(
+            lambda context, report, stopped: on_table(context, stone, report, stopped),
+            lambda done, text: told(share + 0.4 * done, text),
+            cancel,
+        )
+    return replace(found, table=thrown)

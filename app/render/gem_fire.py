@@ -1,0 +1,30 @@
+"""The fire that a stone throws on a table under a lamp: the caustic, and how much of it is coloured."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator
+
+import numpy as np
+
+from ..edit.parameters import Stage
+from ..gpu.context import Context
+from ..model.gem_scene import TABLE, under_lamp
+from ..model.optics.gem_figures import Stone
+from ..model.optics.gem_report import TableFire
+from ..model.settings import RenderSettings
+from .bake import bake_map
+
+_SIDE = 512
+_PHOTONS = 400_000
+
+
+def table_fire(context: Context, stone: Stone, stop: Callable[[], bool]) -> Generator[float, None, TableFire]:
+    """In steps, pausing with the share done; what was done when `stop()` turned true counts. Raises `UserError`."""
+    scene = under_lamp(stone)
+    settings = RenderSettings(width=_SIDE, height=_SIDE, photons=_PHOTONS, max_depth=scene.render.max_depth)
+    baked = yield from bake_map(context, Stage(scene, scene.camera), settings, TABLE, stop)
+    rgb = np.asarray(baked.picture.rgb, np.float64)
+    total = float(rgb.mean(axis=-1).sum())
+    # Spectral colours have negative parts: no white in them.
+    white = float(np.maximum(rgb.min(axis=-1), 0.0).sum())
+    return TableFire(baked.picture.rgb, 1.0 - white / total if total > 0.0 else 0.0, baked.photons)
