@@ -21,9 +21,8 @@ export class Light {
     // Sums in 32 bits where they can be blended; in 16 otherwise, less exact in bright places.
     this.isFull = Boolean(gl.getExtension("EXT_color_buffer_float") && gl.getExtension("EXT_float_blend"));
     gl.getExtension("EXT_color_buffer_half_float");
-    const bent = `const bool BENT = ${head.mode !== "index"};\n`;
-    this.splats = this.program(SPLAT_VERTEX, SPLAT_FRAGMENT, bent);
-    this.beams = this.program(BEAM_VERTEX, BEAM_FRAGMENT, bent);
+    this.splats = this.program(SPLAT_VERTEX, SPLAT_FRAGMENT, `const bool BENT = ${head.mode !== "index"};\n`);
+    this.beams = this.program(BEAM_VERTEX, BEAM_FRAGMENT, `const int MOST = ${Math.max(beams.most, 1)};  // edges of a polygon\n`);
     this.view = this.program(WHOLE_VERTEX, VIEW_FRAGMENT, "");
     this.solid = this.program(SOLID_VERTEX, SOLID_FRAGMENT, "");
     this.paths = this.texture();

@@ -3,13 +3,14 @@
 export const PHOTON = 24, BEAM = 20, ABREAST = 256;
 const table = (count, floats) => new Float32Array(floats * ABREAST * Math.ceil(count / ABREAST));
 
-// Place, change with the third index; sides; change with two indices; x and row; throughput, 0; waves.
+// Place, change with the third index; sides; change with two indices; x and row; throughput, 0; points of its
+// lattice, edge of its light, by how much it widens along its sides.
 export function photonRows(head, array, shapeOf) {
   const count = shapeOf("photons.position")[0], rows = table(count, PHOTON);
   if (!count) return { rows, count };
-  const [position, s, t, change, x, throughput, light, lattice] =
-    ["position", "axis_s", "axis_t", "dposition_dn", "x", "throughput", "light", "lattice"].map((name) => array(`photons.${name}`));
-  const groups = change.length / (2 * count), unit = head.photons.unit ?? 1, known = new Map();
+  const [position, s, t, change, x, throughput, light, lattice, edge, fan] =
+    ["position", "axis_s", "axis_t", "dposition_dn", "x", "throughput", "light", "lattice", "edge", "fan"].map((name) => array(`photons.${name}`));
+  const groups = change.length / (2 * count), unit = head.photons.unit ?? 1;
   for (let i = 0; i < count; i++) {
     const at = PHOTON * i;
     rows.set([position[2 * i], position[2 * i + 1]], at);
@@ -18,16 +19,7 @@ export function photonRows(head, array, shapeOf) {
       rows.set([change[2 * (groups * i + g)], change[2 * (groups * i + g) + 1]], g === 2 ? at + 2 : at + 8 + 2 * g);
     rows.set([x[3 * i], x[3 * i + 1], x[3 * i + 2], light?.[i] ?? 0], at + 12);
     for (let k = 0; k < 3; k++) rows[at + 16 + k] = throughput[3 * i + k] * unit;
-    const points = lattice?.[i] ?? 0;
-    if (!points) continue;
-    if (!known.has(points)) known.set(points, lowestFrequencies(points));
-    // From cycles a spacing to cycles a unit.
-    const area = s[2 * i] * t[2 * i + 1] - s[2 * i + 1] * t[2 * i];
-    if (Math.abs(area) < 1e-30) continue;
-    known.get(points).forEach(([p, q], k) => {
-      rows[at + 20 + 2 * k] = (p * t[2 * i + 1] - q * s[2 * i + 1]) / area;
-      rows[at + 21 + 2 * k] = (q * s[2 * i] - p * t[2 * i]) / area;
-    });
+    rows.set([lattice[i], edge[i], fan[2 * i], fan[2 * i + 1]], at + 20);
   }
   return { rows, count };
 }
@@ -35,10 +27,11 @@ export function photonRows(head, array, shapeOf) {
 // A rectangle that holds the polygon; edges and row; density; slope; x and least penumbra, 0. Edges about its middle, two texels each.
 export function beamRows(array) {
   const x = array("beams.x"), count = x ? x.length / 2 : 0, rows = table(count, BEAM);
-  if (!count) return { rows, count, edges: new Float32Array(0) };
+  if (!count) return { rows, count, most: 0, edges: new Float32Array(0) };
   const [density, slope, centre, light, first, edge, hullFirst, hull] =
     ["density", "slope", "centre", "light", "first", "edge", "hull_first", "hull"].map((name) => array(`beams.${name}`));
   const edges = new Float32Array(4096 * Math.ceil(edge.length / 4096));
+  let most = 0;
   for (let i = 0; i < count; i++) {
     const { middle, along, half } = rectangle(hull, hullFirst[i], hullFirst[i + 1]), [a, b, c] = density.subarray(3 * i);
     rows.set([...middle, along[0] * half[0], along[1] * half[0], half[1], first[i], first[i + 1] - first[i], light?.[i] ?? 0,
@@ -47,6 +40,7 @@ export function beamRows(array) {
     const softness = Array.from(edge.subarray(8 * first[i], 8 * first[i + 1])).filter((_, k) => k % 4 === 3).map((soft) => Math.max(soft, 0));
     const widest = Math.max(...softness), isNarrow = Math.sqrt(4 * half[0] * half[1]) < 4 * widest;
     rows[BEAM * i + 18] = isNarrow ? widest : Math.min(...softness);
+    most = Math.max(most, first[i + 1] - first[i]);
     for (let e = first[i]; e < first[i + 1]; e++) {
       const line = edge.subarray(8 * e, 8 * e + 8);
       const scale = 2 / (Math.hypot(line[0], line[1]) + Math.hypot(line[4], line[5]));
@@ -56,7 +50,7 @@ export function beamRows(array) {
       edges.set(to.map((value, k) => value - from[k]), 8 * e + 4);
     }
   }
-  return { rows, count, edges };
+  return { rows, count, most, edges };
 }
 
 // The rectangle of least area along a side of a convex polygon, corners `from` to `to`.
@@ -78,16 +72,4 @@ function rectangle(hull, from, to) {
     best = { middle: [p * ex - q * ey, p * ey + q * ex], along: [ex, ey], half };
   }
   return best;
-}
-
-// The emission lattice's two lowest frequencies, in cycles a spacing; the third is their sum (shaders/lib/lattice.glsl of
-// the desktop program).
-const GOLDEN_RATIO = (1 + Math.sqrt(5)) / 2;
-
-export function lowestFrequencies(points) {
-  const k = Math.max(Math.round((0.5 * Math.log(Math.sqrt(5) * points)) / Math.log(GOLDEN_RATIO)), 2);
-  return [k, k - 1].map((step) => {
-    const sign = step % 2 ? -1 : 1, power = GOLDEN_RATIO ** step;
-    return [(Math.sqrt(points) * sign) / power, (power - sign / power) / Math.sqrt(5 * points)];
-  });
 }

@@ -88,8 +88,9 @@ flat out vec3 ripple;
 flat out vec3 moments[4]; // of a short sweep's light about its middle, in standard deviations, each over its factorial
 flat out vec4 rect;
 out vec4 at;              // across, along (0 to 1), cycles
+out float lit;            // how far inside of the light's edge, 0 to 1 over its blur
 ` + SWEPT + `
-const float TEXEL = 1.0 / 12.0;
+const float TEXEL = 1.0 / 12.0, NARROWED = 0.4 / 0.45;
 vec2 shift_to(float x) {
   float place = clamp(x, 0.0, 1.0) * float(SAMPLES - 1);
   int i = min(int(place), SAMPLES - 2);
@@ -101,6 +102,20 @@ vec2 shift_to(float x) {
   n -= below + (place - float(i)) * (texelFetch(paths, ivec2(i + 1, 1), 0) - below);
   return n.x * v01.xy + n.y * v01.zw + n.z * place_v2.zw;
 }
+// Point of the emission lattice, in steps of which three are the shortest (shaders/lib/lattice.glsl there): its two
+// lowest frequencies, cycles a spacing; the third is their sum.
+vec2 frequency(float count, float before) {
+  const float GOLDEN_RATIO = 1.618033989, ROOT_5 = 2.236067977;
+  float k = max(round(0.5 * log(ROOT_5 * count) / log(GOLDEN_RATIO)), 2.0) - before;
+  float sign_k = mod(k, 2.0) < 0.5 ? 1.0 : -1.0, power = pow(GOLDEN_RATIO, k);
+  return vec2(sqrt(count) * sign_k / power, (power - sign_k / power) / (ROOT_5 * sqrt(count)));
+}
+vec2 longest_axis(float ss, float st, float tt) {
+  float difference = 0.5 * (ss - tt), root = sqrt(difference * difference + st * st);
+  vec2 axis = difference >= 0.0 ? vec2(root + difference, st) : vec2(st, root - difference);
+  return dot(axis, axis) > 0.0 ? normalize(axis) : vec2(1.0, 0.0);
+}
+float cross2(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
 float sinc(float x) { float a = 3.14159265 * x; return abs(a) < 1e-2 ? 1.0 - a * a / 6.0 : sin(a) / a; }
 // What is drawn, in its own frame, texels: its Fourier transform at k cycles a texel.
 vec2 along, across;
@@ -121,8 +136,8 @@ void add_moments(vec3 light, float at, float variance) {
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   place_v2 = record(0); v01 = record(2); span = record(3);
-  // Sides of a lattice cell; throughput from, at the anchor, to; the lattice's two lowest frequencies, cycles a unit.
-  vec4 sides = record(1), carried = record(4), waves = record(5);
+  // Sides of a lattice cell; throughput from, at the anchor, to; points of the lattice, edge, change of W along the sides.
+  vec4 sides = record(1), carried = record(4), origin = record(5);
   float x_lo = max(span.x, support.x), x_hi = min(span.z, support.y);
   if (x_hi <= x_lo) return;
   vec2 to_lo = shift_to(x_lo), to_hi = shift_to(x_hi);
@@ -133,7 +148,20 @@ void main() {
   vec2 centre = seen.xy / seen.z;
   mat2 j = mat2(to_texel[0].xy - centre * to_texel[0].z, to_texel[1].xy - centre * to_texel[1].z) / seen.z, back = inverse(j);
   vec2 fan = vec2(to_texel[0].z, to_texel[1].z) * back / seen.z;
-  vec2 chord = j * (to_hi - to_lo), s = smoothing * (j * sides.xy), t = smoothing * (j * sides.zw);
+  vec2 chord = j * (to_hi - to_lo), s = j * sides.xy, t = j * sides.zw;
+  float cell = cross2(s, t), smoothed = smoothing;
+  bool lattice = origin.x > 0.0 && abs(cell) > 1e-6;
+  // Less where the spectrum stays within a spacing: what ripple that leaves is taken off.
+  if (lattice) {
+    float parted = 2.5 * length(vec2(cross2(chord, t), cross2(s, chord)) / cell) - 0.25;
+    smoothed *= mix(NARROWED, 1.0, clamp(max(parted, 4.0 - 4.0 * sqrt(abs(cell))), 0.0, 1.0));
+  }
+  vec2 longest = longest_axis(dot(s, s), dot(s, t), dot(t, t));
+  float widens = dot(origin.zw, longest);
+  longest = longest.x * s + longest.y * t;
+  float length2 = dot(longest, longest);
+  if (smoothed * sqrt(length2) > 0.75) fan += widens / length2 * longest;
+  s *= smoothed; t *= smoothed;
   float bend = 0.0;
   if (BENT) {
     vec2 half_way = j * (shift_to(0.5 * (x_lo + x_hi)) - to_lo);
@@ -149,8 +177,7 @@ void main() {
   s *= finer; t *= finer; chord *= finer; centre *= finer; cov *= finer * finer; radius *= finer * finer;
   difference *= finer * finer; thin *= finer * finer; fan /= finer;
   // Along the sweep; or along what is too thin for that, if its sweep leaves it by less than half a texel.
-  vec2 e = difference >= 0.0 ? vec2(radius + difference, cov.y) : vec2(cov.y, radius - difference);
-  e = dot(e, e) > 0.0 ? normalize(e) : vec2(1.0, 0.0);
+  vec2 e = longest_axis(cov.x, cov.y, cov.z);
   e *= dot(e, chord) < 0.0 ? -1.0 : 1.0;
   float sweep = length(chord), aside = abs(e.x * chord.y - e.y * chord.x), blur = 0.0;
   if (sweep < 1e-4 || (thin < 0.15 && aside < 0.5 && radius > aside * aside * TEXEL)) {
@@ -159,7 +186,8 @@ void main() {
   } else e = chord / sweep;
   vec2 m = vec2(-e.y, e.x), sa = vec2(dot(s, e), dot(s, m)), ta = vec2(dot(t, e), dot(t, m));
   float a = sa.x * sa.x + ta.x * ta.x, b = sa.x * sa.y + ta.x * ta.y, c = sa.y * sa.y + ta.y * ta.y;
-  float cell = sa.x * ta.y - sa.y * ta.x, determinant = cell * cell - taken * (a + c - taken);
+  cell = cross2(sa, ta);
+  float determinant = cell * cell - taken * (a + c - taken);
   a -= taken;
   c -= taken;
   // Across: a box as wide as a texel there, and the rest of the texel as a Gaussian.
@@ -183,19 +211,33 @@ void main() {
   }
   float amplitude = 1.0
     / (box * kept(edge, box, root) * kept(reach, sweep, sigma) * clamp(grid, 0.7, 1.4));
-  vec2 corner = corner();
+  // What fans out too far along one axis is not drawn there, and the rest is brighter for it (shaders/lib/fan.glsl there).
+  vec2 corner = corner(), widening = vec2(dot(fan, long_side), dot(fan, short_side));
+  widening *= min(1.0, min(3.0 / max(length(fan) * sqrt(thin + 2.0 * radius), 1e-9),
+    0.8 * reach / max(abs(widening.x) * 0.5 * sweep, 1e-9)));
+  bool is_along = abs(widening.x) >= abs(widening.y);
+  widening = clamp(widening, is_along ? vec2(-3.0, -0.05) : vec2(-0.05, -3.0), is_along ? vec2(3.0, 0.05) : vec2(0.05, 3.0));
+  vec2 size2 = abs(widening);
+  float end = min((0.85 - min(size2.x, size2.y)) / max(max(size2.x, size2.y), 1e-9), 1.0);
+  vec2 ends = is_along ? vec2(end, 1.0) : vec2(1.0, end);
+  if (dot(widening, vec2(is_along, !is_along) * corner) < 0.0) corner *= ends;
+  amplitude *= 2.0 * kept(reach, sweep, sigma) / (kept(reach, sweep, sigma) + kept(ends.x * reach, sweep, sigma));
+  amplitude *= 2.0 * kept(edge, box, root) / (kept(edge, box, root) + kept(ends.y * edge, box, root));
   // Splats about a lattice's points add up to 1 and a ripple, which each takes off.
   ripple = vec3(0.0);
   at.zw = vec2(0.0);
-  if (waves != vec4(0.0)) {
-    vec2 k[3];
-    k[0] = waves.xy * back / finer; k[1] = waves.zw * back / finer; k[2] = k[0] + k[1];
-    float swept = sweep * sweep * TEXEL, share = swept / (along2 + swept);
+  lit = 1.0;
+  float swept = sweep * sweep * TEXEL, share = swept / (along2 + swept);
+  mat2 to_spacings = smoothed / cell * mat2(t.y, -t.x, -s.y, s.x);
+  if (lattice && abs(cell) > 1e-6) {
+    vec2 steps[3], k[3];
+    steps[0] = frequency(origin.x, 0.0); steps[1] = frequency(origin.x, 1.0); steps[2] = steps[0] + steps[1];
     vec3 heights, seen;
     for (int i = 0; i < 3; ++i) {
+      k[i] = to_spacings * steps[i];
       float coarse = max(abs(k[i].x), abs(k[i].y)), ka = TWO_PI * dot(k[i], e);
-      vec2 turns = vec2(dot(k[i], s), dot(k[i], t));
-      float most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * max(dot(turns, turns) - taken * dot(k[i], k[i]), 0.0));
+      float turns2 = smoothed * smoothed * dot(steps[i], steps[i]) - taken * dot(k[i], k[i]);
+      float most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * max(turns2, 0.0));
       heights[i] = clamp(damping(k[i], 0.0), 0.0, most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
       seen[i] = 2.0 * exp(-0.5 * ka * ka * share * along2);
     }
@@ -204,6 +246,17 @@ void main() {
     amplitude /= 1.0 - 2.0 * dot(heights, less);
     at.zw = corner.x * (1.0 - share) * vec2(dot(k[0], long_side), dot(k[1], long_side))
       + corner.y * vec2(dot(k[0], short_side), dot(k[1], short_side));
+  }
+  // Where the light's emission ends the splat does, too (shaders/light/splat_lines.glsl there).
+  if (origin.y > 0.0 && abs(cell) > 1e-6) {
+    float turn = TWO_PI / 4096.0 * floor(origin.y / 4096.0), inside = (2.0 * mod(origin.y, 4096.0) - 1.0) / 4095.0 - 1.0;
+    vec2 within = to_spacings * vec2(cos(turn), sin(turn));
+    float ahead = dot(within, e), variance = dot(within, within) * TEXEL + ahead * ahead * share * along2;
+    if (variance < 0.16) {
+      float sharp = sqrt(TEXEL / max(variance, 1e-12));
+      lit = 0.5 + sharp * (inside + (1.0 - share) * corner.x * dot(within, long_side) + corner.y * dot(within, short_side));
+      amplitude /= below_normal(inside / 0.42);
+    }
   }
   at.xy = vec2(corner.y * edge * SQRT_HALF / root, 0.5 + corner.x * reach / sweep);
   band = vec4(x_lo, span.y, x_hi, sigma / sweep);
@@ -230,9 +283,8 @@ void main() {
     }
   }
   rect = rect_of(level);
-  fan *= min(1.0, 0.8 / max(abs(dot(fan, long_side)) + abs(dot(fan, short_side)), 1e-9));
   vec2 beside = corner.x * long_side + corner.y * short_side;
-  float w = 1.0 + dot(fan, beside);
+  float w = 1.0 + dot(widening, corner);
   gl_Position = vec4(((rect.xy + centre) * w + beside) / vec2(1.5 * float(size.x), size.y) * 2.0 - w, 0.0, w);
 }`;
 
@@ -240,11 +292,13 @@ export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + `
 flat in vec4 band, weights, shape, rect;
 flat in vec3 ripple, moments[4];
 in vec4 at;
+in float lit;
 out vec4 deposited;
 ` + SWEPT + `void main() {
   if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
   float w = 1.0 / gl_FragCoord.w;
   float share = w * w * 0.5 * (error_function(min(at.x + w * shape.x, 6.0)) - error_function(max(at.x - w * shape.x, -6.0)));
+  share *= clamp(lit, 0.0, 1.0);
   vec3 away = abs(fract(vec3(at.zw, at.z + at.w)) * 2.0 - 1.0);
   share *= 1.0 - dot(ripple, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);
   float z = (at.y - 0.5) / band.w;
@@ -346,7 +400,6 @@ vec2 in_texel(vec2 n, float h) {
   vec2 p = (-0.5 - foot) / d, q = (0.5 - foot) / d, low = min(p, q), high = max(p, q);
   return vec2(max(low.x, low.y), min(high.x, high.y));
 }
-const int MOST = 16;
 float covered(float t) {
   vec3 lines[MOST];
   int count = 0;
@@ -354,7 +407,7 @@ float covered(float t) {
     vec3 own = line_at(list.x + i, t);
     float reach = 0.5 * (abs(own.x) + abs(own.y));
     if (own.z <= -reach) return 0.0;
-    if (own.z < reach && count < MOST) lines[count++] = own;
+    if (own.z < reach) lines[count++] = own;
   }
   if (count == 0) return 1.0;
   if (count == 1) {

@@ -64,6 +64,7 @@ def photons(
         "photons.axis_t": np.tile(t, (3, 1)).astype("f2"), "photons.x": np.tile(bits, (3, 1)).astype("u2"),
         "photons.dposition_dn": np.tile([change], (3, 1, 1)).astype("f2"), "photons.light": np.zeros(3, "u1"),
         "photons.throughput": np.tile(carried, (3, 1)).astype("f2"), "photons.lattice": np.zeros(3, "u4"),
+        "photons.edge": np.zeros(3, "u4"), "photons.fan": np.zeros((3, 2), "f2"),
     }  # fmt: skip
 
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from interface.browser import CHROMIUM, Browser
+from interface.page_pixels import difference, gathered
 from interface.page_synthetic import TEXELS, beam, beam_map, photon_map, photons, written
-from scipy.ndimage import map_coordinates
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed: apt-get install chromium")
 FEW = photons([0.12, 0.04], [-0.04, 0.08], [8.0, 3.0], [0.001, 0.001, 0.001], [0.0, 0.5, 1.0])
@@ -26,24 +26,11 @@ def browser() -> Iterator[Browser]:
 
 
 def shown_map(browser: Browser) -> np.ndarray:
-    """Irradiance (rows, columns, 3) on the window, seen from above, all levels together."""
+    """Irradiance (rows, columns, 3) on the window, v upwards along rows, seen from above."""
     browser.run("spectrasplat.frame()")
-    step, side = 2.0 / TEXELS, TEXELS
-    browser.run(f"spectrasplat.light.gather([{step}, 0, -1, 0, {-step}, 1, 0, 0, 1], {side}, {side})")
-    width, height, stride = browser.run("(window.m = spectrasplat.light.readMap(), [m.width, m.height, m.stride])")
-    stored = browser.floats("window.m.values").reshape(height, stride, 4)[..., :3].astype(float)
-    found = stored[:, :width].copy()
-    for level in range(1, 6):
-        low, side = height - (height >> level - 1), width >> level
-        places = np.clip((np.mgrid[:height, :width] + 0.5) / 2**level - 0.5, 0, side - 1)
-        part = stored[low : low + side, width : width + side]
-        found += 0.25**level * np.stack([map_coordinates(part[..., c], places, order=1) for c in range(3)], axis=-1)
-    return found / step**2
-
-
-def difference(found: np.ndarray, right: np.ndarray) -> float:
-    """Root mean square, over that of what is right."""
-    return float(np.sqrt(np.mean((found - right) ** 2) / np.mean(right**2)))
+    step = 2.0 / TEXELS
+    to_uv = np.array([[step, 0.0, -1.0], [0.0, -step, 1.0], [0.0, 0.0, 1.0]])
+    return gathered(browser, to_uv, TEXELS, TEXELS)[::-1]
 
 
 def test_it_opens_from_a_file_and_asks_for_nothing(browser: Browser, tmp_path: Path) -> None:

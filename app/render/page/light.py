@@ -14,7 +14,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...beams.facets import convex_hull
-from ...gpu.records import LATTICE_BIT
+from ...gpu.records import EDGE_BIT, LATTICE_BIT
 from ...gpu.spectral_groups import samples_of
 from ...model.optics.colorimetry import VISIBLE_NM
 from ...passes.plane_frame import PlaneFrame, plane_frame
@@ -139,6 +139,8 @@ def _photons(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -
         "throughput": records["throughput"].astype(float) / max(weight, 1e-300),
         "light": (records["light_and_source"] & 255).astype("u1"),
         "lattice": (records["flags"] >> LATTICE_BIT).astype("u4"),
+        "edge": (records["depth"] >> EDGE_BIT).astype("u4"),
+        "fan": np.ascontiguousarray(records["fan"]).view("f2").reshape(-1, 2),
     }
 
 
