@@ -19,11 +19,14 @@ from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from ..model.tint_bands import tint_curves
 
-DIELECTRIC, MIRROR, BLACK, RECEIVER = 0, 1, 2, 3
+DIELECTRIC, MIRROR, BLACK, RECEIVER, FACED = 0, 1, 2, 3, 4
+"""What a facet is of; FACED: of a receiver of several, which has no map that polygons could be drawn into."""
 MAX_SOLIDS = 62
 """Transparent solids that fit the bits of a beam's medium."""
 MAX_FACETS = 4096
 """An object of more facets is left to photons whatever it would cost."""
+MAX_FACED = 128
+"""Triangles of a receiver that is no plane, at most: rays of every beam are tested against all of them."""
 MAX_CORNERS = 10
 """A facet of more corners is cut into pieces."""
 SAMPLES = 2049
@@ -56,7 +59,7 @@ FACET = np.dtype(
         ("triangle", "i8"),
     ]
 )
-"""A facet, in GPU space. `kind`: DIELECTRIC, MIRROR, BLACK or RECEIVER; `owner`: object."""
+"""A facet, in GPU space. `kind`: DIELECTRIC, MIRROR, BLACK, RECEIVER or FACED; `owner`: object."""
 
 SOLID = np.dtype(
     [
@@ -142,7 +145,7 @@ def beam_scene(
             if reason is not None:
                 why_not[i] = reason
                 obstacles.append(i)
-        elif (item.material.receives and not item.mesh.is_flat) or len(item.mesh.triangles) > MAX_FACETS:
+        elif len(item.mesh.triangles) > (MAX_FACED if item.material.receives and not item.mesh.is_flat else MAX_FACETS):
             obstacles.append(i)
         else:
             outlines[i] = _facets_kept(item.mesh, meshes[i])
@@ -373,7 +376,7 @@ def _facets(
         along = outline[1] - outline[0]
         along /= np.linalg.norm(along)
         record["plane"] = *normal, normal @ middle
-        record["kind"] = RECEIVER if material.receives else BLACK
+        record["kind"] = (RECEIVER if scene.objects[i].mesh.is_flat else FACED) if material.receives else BLACK
         if material.is_specular:
             record["kind"] = DIELECTRIC if material.is_solid else MIRROR
         record["owner"], record["triangle"] = i, triangle
@@ -382,7 +385,7 @@ def _facets(
         edge /= np.linalg.norm(edge, axis=1)[:, None]
         record["edge"][: len(outline)] = np.concatenate([edge, np.cross(outline, edge)], axis=1)
         record["centre"], record["radius"] = middle, np.linalg.norm(shifted, axis=1).max()
-        record["receiver"] = receivers.index(i) if material.receives else -1
+        record["receiver"] = receivers.index(i) if record["kind"] == RECEIVER else -1
         record["frame"] = middle, along, np.cross(normal, along)
         if record["receiver"] in frames:
             origin, axes = frames[int(record["receiver"])]

@@ -17,12 +17,12 @@ from .convert import pieces_of, polygons_of
 from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, GoOn, Search, search
 from .leaves import Leaves
-from .polygons import BeamPieces, BeamPolygons, joined
+from .polygons import WIDE, BeamPieces, BeamPolygons, joined
 from .search import SUM_BEAMS, SUMS
 from .sources import emissions, is_near_facets, mask_at, why_no_beams
 
-LIGHT_PARTS = 16
-"""Points that represent an extended light; penumbrae blur each into the next."""
+LIGHT_PARTS = 16, 32, 64
+"""Points that represent an extended light, of which one is chosen (`parts_for`); penumbrae blur each into the next."""
 
 
 @dataclass
@@ -107,7 +107,7 @@ class BeamFinder:
         threshold: float,
         depth: int,
         seed: int,
-        light_parts: int = LIGHT_PARTS,
+        light_parts: int = LIGHT_PARTS[0],
         threads: int | None = None,
         go_on: GoOn = lambda steps: True,
         *,
@@ -174,6 +174,23 @@ class BeamFinder:
         return result
 
 
+def parts_for(polygons: BeamPolygons, watts: np.ndarray, parts: int) -> int:
+    """The fewest of `LIGHT_PARTS` points of extended lights with which nearly all polygons that can be wider than their
+    penumbrae are so: a narrower one is blurred alike in all directions. `polygons` are of lights of so many `parts`,
+    and hold `watts` (N,)."""
+    if not len(polygons):
+        return LIGHT_PARTS[0]
+    soft = np.maximum.reduceat(polygons.edges[:, [3, 7]].max(axis=1), polygons.edge_start[:-1])
+    low, high = (f.reduceat(polygons.hulls, polygons.hull_start[:-1]) for f in (np.minimum, np.maximum))
+    longest = np.linalg.norm(high - low, axis=1) - 2.0 * math.sqrt(2.0) * soft
+    width = polygons.area / np.maximum(longest, np.sqrt(polygons.area) + 1e-12)
+    needed = parts * (_ROOM * WIDE * 2.0 * soft / np.maximum(width, 1e-12)) ** 2
+    held = [watts[needed <= count].sum() for count in LIGHT_PARTS]
+    return LIGHT_PARTS[int(np.argmax(np.array(held) >= _MOST_WIDE * max(held[-1], 0.5 * watts.sum())))]
+
+
+_MOST_WIDE, _ROOM = 0.99, 1.5
+"""Share of their light, and how many times as wide as they must be: narrower bands change them."""
 _TAILS_PLAY = 1.0 / 16.0
 """Share of the threshold below which what is left to photons plays roulette."""
 _TOGETHER = 10_000

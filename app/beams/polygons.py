@@ -15,6 +15,9 @@ from typing import Self
 
 import numpy as np
 
+WIDE = 2.0
+"""Penumbrae; a wider polygon has places that are all inside, and every edge has its own penumbra."""
+
 
 class Outlines:
     """Values a row each, with edges from `edge_start` on and corners of hulls from `hull_start` on."""

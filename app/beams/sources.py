@@ -153,11 +153,13 @@ def _diverging(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
     if is_area:
         edge_u, edge_v, _ = light.axes().T
         half = np.array(light.half_extent) * unit
-        places = _places(parts) if light.is_disc else _grid(parts)
+        if light.is_disc:
+            places, cell = _places(parts), half / math.sqrt(parts)
+        else:
+            places, cell = _grid(parts, half)
         offsets = places[:, :1] * half[0] * edge_u + places[:, 1:] * half[1] * edge_v
         measure = light.area / len(offsets)
-        scale = 1.0 / math.sqrt(len(offsets))
-        spread = (edge_u * half[0] * scale, edge_v * half[1] * scale)
+        spread = (edge_u * cell[0], edge_v * cell[1])
     result = []
     for offset in offsets:
         place = origin + offset
@@ -167,9 +169,12 @@ def _diverging(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
                 continue
             if is_area:
                 limits = np.concatenate([limits, [_line_of(direction, forward, right, up)]])
-            args = (forward, right, up, direction, light.cone, is_area)
-            source = _source(POINT, place, *args)
-            shifted = tuple(_source(POINT, place + s, *args) for s in spread)
+            axes, shape = (right, up), (direction, light.cone, is_area)
+            source = _source(POINT, place, forward, *axes, *shape)
+            # The same q leads to the same place at the distance of the glass, about which rays are straight.
+            depth = (corners - place) @ forward
+            ahead = float(depth[depth > 0.0].mean()) if (depth > 0.0).any() else math.inf
+            shifted = tuple(_source(POINT, place + s, forward - s / ahead, *axes, *shape) for s in spread)
             result.append(Emission(source, limits, room, density=measure, shifted=shifted, **common))
     return result
 
@@ -247,12 +252,13 @@ def _places(count: int) -> np.ndarray:
     return places @ (axes * np.sqrt(0.25 * (1.0 - 1.0 / count) / variance)) @ axes.T
 
 
-def _grid(count: int) -> np.ndarray:
-    """Middles of the cells of [-1, 1]²."""
-    side = max(1, round(math.sqrt(count)))
-    middles = (2.0 * np.arange(side) + 1.0) / side - 1.0
-    u, v = np.meshgrid(middles, middles)
-    return np.column_stack([u.ravel(), v.ravel()])
+def _grid(count: int, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Middles (n, 2), in [-1, 1]², of about `count` cells, as nearly square as can be, of a rectangle with half sides
+    `half` (2,); and the radii (2,) of a disc with a cell's variances."""
+    across = min(max(1, round(math.sqrt(count * half[0] / half[1]))), count)
+    cells = np.array([across, max(1, round(count / across))])
+    u, v = np.meshgrid(*((2.0 * np.arange(n) + 1.0) / n - 1.0 for n in cells))
+    return np.column_stack([u.ravel(), v.ravel()]), 2.0 / math.sqrt(3.0) * half / cells
 
 
 def _source(kind, origin, forward, right, up, axis=None, cone=(4.0, 4.0), lambert=False) -> np.ndarray:

@@ -10,7 +10,7 @@ from .flight import fly
 from .leaves import has_room
 from .nodes import copy, lay_out
 from .rays import PARALLEL, emit_straight
-from .search import FRAGMENTS, LEAF_RECEIVER, SUM_NUMERIC, flux_of
+from .search import FRAGMENTS, LEAF_PIECE, LEAF_RECEIVER, SUM_NUMERIC, flux_of
 
 
 @part
@@ -35,8 +35,8 @@ def run(nodes, facets, solids, tables, sources, obstacles, works, leaf, edge, co
         work.steps -= 1
         work.top -= 1
         copy(nodes[work.top], beam)
-        if beam.facet >= 0 and beam.ends < 0 and facets[beam.facet].kind == 3:
-            beam.ends = LEAF_RECEIVER
+        if beam.facet >= 0 and beam.ends < 0 and facets[beam.facet].kind >= 3:
+            beam.ends = LEAF_RECEIVER if facets[beam.facet].kind == 3 else LEAF_PIECE
         if beam.ends >= 0:
             if beam.depth > 0 or beam.facet < 0:
                 end(nodes, facets, solids, tables, sources, leaf, edge, corner, work)

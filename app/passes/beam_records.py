@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..beams.polygons import BeamPolygons
+from ..beams.polygons import WIDE, BeamPolygons
 from ..gpu.beam_tables import CurveParts
 from ..gpu.schema import Field, Struct
 from .texel_map import TexelMap
@@ -59,8 +59,6 @@ PARTS = 3, 10
 """Parts in which the time of a texel is taken that a wide polygon's edges cross, at least and at most."""
 BORDER = 2.0
 """Texels that a triangle costs besides its own, per texel of its sides: they are filled in blocks of 4 x 4."""
-WIDE = 2.0
-"""Windows; a wider polygon has texels that are all inside."""
 MOSTLY_INSIDE = 4.0
 """Windows; of a wider polygon few texels are crossed by its edges, whose times are taken in few parts."""
 PLACES = 5

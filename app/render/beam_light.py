@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from ..base.generators import finished, mapped, timed
-from ..beams.light_beams import BeamFinder, LightBeams
+from ..beams.light_beams import LIGHT_PARTS, BeamFinder, LightBeams, parts_for
 from ..beams.polygons import BeamPolygons
 from ..beams.search import (
     SUM_ABSORBED,
@@ -153,6 +153,7 @@ class BeamLight:
         self.stats = BeamStats()
         self._surveyed = self._with_tails = 1.0
         """Beams that are followed at `SURVEY`: where weak ones play roulette, and where they are left to photons."""
+        self._light_parts = LIGHT_PARTS[0]
         self._survey_polygons: BeamPolygons | None = None
         """What maps are fitted to."""
         self.found: LightBeams | None = None
@@ -192,9 +193,14 @@ class BeamLight:
                 "weak beams of lights with emission lines over a continuum are so many that photons leave less noise"
             )
             return
+        if _left(strongest) > sum(float(sums[SUM_DEPOSITED]) for sums in strongest.sums.values()):
+            self.why_not = "most of their light lands on what is not flat, which photons draw"
+            return
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
         self._surveyed, self._with_tails = max(1.0, found.followed() * to_survey), max(1.0, strongest.followed())
+        if strongest.polygons is not None:
+            self._light_parts = parts_for(strongest.polygons, self._watts(strongest.polygons), light_parts)
 
     @property
     def leaves_strong(self) -> bool:
@@ -255,7 +261,8 @@ class BeamLight:
         finest = _finest(SURVEY, surveyed)
         while True:
             threshold = max(self._threshold(photons, surveyed, growth), finest)
-            search = self._worker.searched(partial(self.finder.find, threshold, self._depth, word, tails=tails))
+            find = partial(self.finder.find, threshold, self._depth, word, self._light_parts, tails=tails)
+            search = self._worker.searched(find)
             found = yield from mapped(timed(search, partial(stats.count, "find_seconds")), lambda share: 0.5 * share)
             # Where light leaves the scene soon, fewer weak beams follow than expected: the search is done again, finer.
             # No later pass uses what is learnt here: a pass must not depend on those before it.
@@ -332,13 +339,17 @@ class BeamLight:
             places, flux = [self._buffers.space.to_gpu(own)], [np.zeros(len(own))]
             if polygons is not None and (polygons.receiver == r).any():
                 corners = np.diff(polygons.hull_start)
-                power = np.array([float(p.band(0.0, 1.0)[3]) for p in self._buffers.light_power])
-                each = np.repeat(polygons.flux * power[polygons.light] / np.maximum(corners, 1), corners)
+                each = np.repeat(self._watts(polygons) / np.maximum(corners, 1), corners)
                 mine = np.repeat(polygons.receiver, corners) == r
                 places.append(frame.origin + polygons.hulls[mine] @ frame.axes)
                 flux.append(each[mine])
                 result[r] = Landings(np.concatenate(places), np.concatenate(flux))
         return result
+
+    def _watts(self, polygons: BeamPolygons) -> np.ndarray:
+        """W of each."""
+        power = np.array([float(p.band(0.0, 1.0)[3]) for p in self._buffers.light_power])
+        return polygons.flux * power[polygons.light]
 
     def survey_again(self) -> None:
         """Find anew where light lands: with the glass that is shown, and as finely as for a still."""
@@ -379,6 +390,11 @@ class BeamLight:
 def _found(finder: BeamFinder, threshold: float, depth: int) -> LightBeams:
     """The beams of a search in motion."""
     return finished(finder.find(threshold, depth, _MOVING_WORD, MOVING_PARTS))
+
+
+def _left(found: LightBeams) -> float:
+    """Flux that photons carry on though it is not weak, as of `LightBeams.sums`."""
+    return 0.0 if found.pieces is None else float(found.pieces.flux[~found.pieces.is_tail].sum())
 
 
 def _finest(threshold: float, followed: float) -> float:

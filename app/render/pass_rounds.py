@@ -25,10 +25,9 @@ BEAM_ROUND = 1 << 19
 """Photons' worth of beams, where they carry everything, after which a pass may be stopped."""
 MIN_BEAM_PHOTONS = 1 << 17
 """Photons, at least, whose beams are found at once, where photons are traced besides."""
-_TAIL_SHARE = 1.0
-"""Photons that carry on weak beams, over those of a round."""
-_TAIL_DENSITY = 64.0
-"""As many times more of them than an even lattice would have there, at most."""
+_DENSITY = 64.0
+"""As many times more photons than an even lattice would have, at most, carry on weak beams, and all that beams leave
+where no others are traced; never more than a round's."""
 _FEWEST = 256
 """Photons over the pieces of a light."""
 
@@ -153,7 +152,8 @@ class PassRounds:
             return
         emission = BeamEmission(self.survey.buffers, batches.trace.ray, pieces, batches.records.tables.spans)
         most, entered_w = batches.budget.units, beams.stats.entered_w
-        for light, rays in _continuing_rays(emission, entered_w, share, weight, most, self.seed, self._nth(of)):
+        denser = 1.0 if self.plans and not tails else _DENSITY
+        for light, rays in _continuing_rays(emission, entered_w, share, weight, denser, most, self.seed, self._nth(of)):
             self.into.stats.trace_seconds += time.perf_counter() - started
             yield from batches.carry_on(rays, light, of, self.into, of_tails=tails)
             started = time.perf_counter()
@@ -165,14 +165,21 @@ class PassRounds:
 
 
 def _continuing_rays(
-    emission: BeamEmission, entered_w: float, photons: float, weight: float, most: int, seed: int, number: int
+    emission: BeamEmission,
+    entered_w: float,
+    photons: float,
+    weight: float,
+    denser: float,
+    most: int,
+    seed: int,
+    number: int,
 ) -> Iterator[tuple[int, np.ndarray]]:
     """Light and ray records, at most `most` at once, of photons that carry on what beams left in round `number` of all
     passes, all of it tails or none.
 
-    `entered_w`: W that met facets, `photons`: of the round, `weight`: factor on their flux. What something curved may
-    meet is as dense as the lattices of emission; tails, which are little light, are denser, and shared out among lights
-    by the root of their flux."""
+    `entered_w`: W that met facets, `photons`: of the round, `weight`: factor on their flux; `denser`: as many times
+    more of them than an even lattice would have there, at most. Tails are shared out among lights by the root of
+    their flux."""
     pieces = emission.pieces
     flux_w = {int(light): emission.flux_w(int(light)) for light in np.unique(pieces.light)}
     entered_w, total = max(entered_w, 1e-300), sum(flux_w.values())
@@ -180,9 +187,10 @@ def _continuing_rays(
     for light, watts in flux_w.items():
         if watts <= 0.0:
             continue
-        count = photons * min(1.0, watts / entered_w)
+        most_of_all = photons * min(1.0, denser * total / entered_w)
+        count = most_of_all * watts / total
         if pieces.is_tail[0]:
-            count = photons * min(_TAIL_SHARE, _TAIL_DENSITY * total / entered_w) * watts**0.5 / roots
+            count = most_of_all * watts**0.5 / roots
             if count < 1.0:
                 continue  # less than a 64th of a photon's power
         shifts = shift(seed, light, number, Dimension.LATTICE_U), shift(seed, light, number, Dimension.LATTICE_V)

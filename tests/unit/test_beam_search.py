@@ -13,7 +13,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
 from spectrasplat.beams.leaves import Leaves
-from spectrasplat.beams.search import LEAF_RECEIVER, NARROWEST, SUM_ENTERED, SUM_ROULETTE
+from spectrasplat.beams.search import LEAF_PIECE, LEAF_RECEIVER, NARROWEST, SUM_ENTERED, SUM_ROULETTE
 from spectrasplat.beams.sources import RIM, _places, emissions
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
@@ -191,3 +191,56 @@ def test_a_round_lamp_is_a_polygon_of_its_area_within_a_thousandth_of_its_radius
     middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
     farthest, nearest = np.linalg.norm(corners, axis=1).max(), np.linalg.norm(middles, axis=1).min()
     assert radius * (1.0 - INSIDE) < nearest < radius < farthest < radius * (1.0 + OUTSIDE)
+
+
+WINDOW = lamp((-600.0, 0.0, 1800.0), (1.0, 0.0, -3.0), (40.0, 400.0), "area")
+"""As a window of a panorama becomes: 1.2° by 12°, far away."""
+STAND = """
+[[objects]]
+name = "stand"
+shape = "box"
+size = [{size}, {size}, 0.2]
+position = [0.2, 0.0, 0.3]
+material = "diffuse"
+"""
+PANE_ABOVE = """
+[[objects]]
+name = "pane"
+shape = "box"
+size = [0.5, 0.8, 0.02]
+position = [0.0, 0.0, 1.0]
+glass = "N-BK7"
+"""
+
+
+def test_penumbrae_of_a_far_window_are_as_wide_as_it_is_seen() -> None:
+    """Rays of its other points were taken to be straight about a place as far from the glass as these points are from
+    each other: penumbrae forty times too wide, which held back a tenth of the light."""
+    rig = Rig(scene_of(WINDOW + PANE_ABOVE))
+    parts = rig.emissions(parts=16)
+    leaves, _ = rig.find(parts[len(parts) // 2], 1e-2)
+    found = Leaves.joined(leaves)
+    strongest = int(found.leaf["flux"].argmax())
+    edges = found.edge[found.leaf["edges"][:strongest].sum() :][: found.leaf["edges"][strongest]]
+    across = np.abs(edges["line"][:, 1, :2] @ rig.beams.facets["frame"][found.leaf["facet"][strongest], 1:])[:, 1] > 0.9
+    # A part is all of the lamp's width and a sixteenth of its length; its light falls slantwise from a height of 1.
+    slant = np.hypot(600.0, 1800.0) / 1800.0
+    assert len(parts) == 16 and across.any() and not across.all()
+    assert edges["soft"][across] == pytest.approx(20.0 / 1897.4 * slant, rel=0.05)
+    assert edges["soft"][~across] == pytest.approx(200.0 / 16.0 / 1897.4 * slant**2, rel=0.05)
+
+
+def test_a_box_ends_beams_and_its_light_is_left_to_photons() -> None:
+    """Light past a box lies on the floor as it does without one, less the box's shadow; none of it goes by photons."""
+    sun = 'kind = "directional"\ndirection = [0.3, 0.0, -1.0]\nilluminance_lx = 1000.0\n'
+    text = "[[lights]]\n" + sun + PANE_ABOVE
+    flux = []
+    for more in ("", STAND.format(size=0.2), STAND.format(size=3.0)):
+        rig = Rig(scene_of(text + more))
+        leaf = Leaves.joined(rig.find(rig.emissions()[0], 1e-3)[0]).leaf
+        flux.append([leaf["flux"][leaf["kind"] == kind].sum() for kind in (LEAF_RECEIVER, LEAF_PIECE)])
+    bare, small, whole = np.array(flux)
+    assert bare[1] == whole[0] == 0.0
+    assert (small.sum(), whole[1]) == pytest.approx((bare[0], bare[0]), rel=1e-6)
+    # Seen along the sun: the top of the small box and one of its sides.
+    assert small[1] == pytest.approx(bare[0] * 0.2 * (0.2 + 0.2 * 0.3) / (0.5 * 0.8), rel=0.02)
