@@ -108,7 +108,7 @@ PLACEMENT = Struct(
         Field("texel_area", "float", "scene unit² per texel where W is 1, times W³ elsewhere"),
         Field("next", "uint", "the coarser placement of the same receiver, or NONE"),
         Field("kind", "uint", "0 flat window, 1 chart triangle, 2 flat window on a picture's pixels"),
-        Field("blurred", "uint", "the same window in texels four times as wide, for broad splats, or NONE"),
+        Field("blurred", "uint", "the same window in wider texels, for broad splats, or NONE"),
     ),
 )
 

@@ -213,8 +213,9 @@ def _by_width(
     record = layout.placements[placement]
     level = levels(polygons, chosen, TexelMap.of(record, frame))
     while len(chosen):
-        wider = int(layout.placements[placement]["blurred"])
-        is_here = (level <= 0) | (wider == NONE)
+        areas, wider = layout.placements["texel_area"], int(layout.placements[placement]["blurred"])
+        doublings = 0 if wider == NONE else int(np.ceil(0.5 * np.log2(areas[wider] / areas[placement]) - 0.01))
+        is_here = (level < doublings) | (wider == NONE)
         if is_here.any():
             yield placement, chosen[is_here]
-        chosen, level, placement = chosen[~is_here], level[~is_here] - 1, wider
+        chosen, level, placement = chosen[~is_here], level[~is_here] - doublings, wider

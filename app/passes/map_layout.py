@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 
 MIN_TILE = 32
 LEVEL_STEPS = (1, 2, 4, 8, 16, 32, 64)
-"""Texel widths in which every window is kept: broad splats go to the wider ones (footprint.comp)."""
+"""Texel widths in which every window is kept: broad splats go to the wider ones (footprint.comp). A window on a
+picture's pixels has whole pixels second, and wider ones from there on (`steps_of`)."""
 _MIN_SIDE = 1e-4
 """Least side of a window as a share of its coordinates: float32 places have some texels in it."""
 _GRID, _SEEN_QUANTILE = 17, 0.9
@@ -86,7 +87,7 @@ class Window:
     low: np.ndarray
     high: np.ndarray
     largest: int | None = None
-    """Longest side, texels, where that is not `Fineness`'s."""
+    """Longest side, texels, of a window of one texel a pixel; None: as `Fineness` says."""
 
     @property
     def size(self) -> np.ndarray:
@@ -104,8 +105,9 @@ class MapLayout:
     tiles: dict[int, list[Tile]]
     windows: dict[int, list[Window | PictureWindow]]
     charts: dict[int, ChartAtlas]
-    folds: tuple[tuple[Tile, Tile], ...]
-    """(wider texels, finer texels) of the same window, in the order in which they are added up."""
+    folds: tuple[tuple[Tile, Tile, int], ...]
+    """(wider texels, finer texels) of the same window, in the order in which they are added up, and how many finer ones
+    along a wider one's side share it evenly; 0: it is two, and interpolated."""
     frames: dict[int, PlaneFrame] = field(default_factory=dict)
     """Frames of flat receivers."""
     borders: dict[int, np.ndarray] = field(default_factory=dict)
@@ -187,7 +189,7 @@ def _layout_maps(
                     size = picture
                 else:
                     size = _tile_size(scene.camera, buffers, frame, window, picture, largest, fineness.texels_per_pixel)
-                sizes += [(-(-size[0] // step), -(-size[1] // step)) for step in LEVEL_STEPS]
+                sizes += [(-(-size[0] // step), -(-size[1] // step)) for step in steps_of(window)]
             plans.append((receiver, frame, windows, None))
         else:
             lit = landed is not None or receiver == map_receiver
@@ -214,7 +216,7 @@ def _place(
     receivers = RECEIVER.zeros(len(plans))
     tile_of: dict[int, list[Tile]] = {}
     charts: dict[int, ChartAtlas] = {}
-    folds: list[tuple[Tile, Tile]] = []
+    folds: list[tuple[Tile, Tile, int]] = []
     count, next_tile = 0, 0
     for receiver, frame, windows, atlas in plans:
         object_index = buffers.receivers[receiver]
@@ -232,13 +234,15 @@ def _place(
             assert frame is not None
             for level, window in enumerate(windows):
                 of_window = levels[level * len(LEVEL_STEPS) : (level + 1) * len(LEVEL_STEPS)]
-                for i, (tile, step) in enumerate(zip(of_window, LEVEL_STEPS, strict=True)):
+                for i, (tile, step) in enumerate(zip(of_window, steps_of(window), strict=True)):
                     placed = _placed(window, frame, buffers.space.scale, tile, of_window[0], step)
                     first = count + level * len(LEVEL_STEPS)
                     placed["next"] = first + len(LEVEL_STEPS) if level + 1 < len(windows) else NONE
                     placed["blurred"] = first + i + 1 if i + 1 < len(LEVEL_STEPS) else NONE
                     placements.append(placed)
-                folds += [(of_window[i + 1], of_window[i]) for i in reversed(range(len(LEVEL_STEPS) - 1))]
+                finest = window.per_pixel if isinstance(window, PictureWindow) else 0
+                parts = (finest, *(0 for _ in LEVEL_STEPS[2:]))
+                folds += reversed([*zip(of_window[1:], of_window[:-1], parts, strict=True)])
             count += len(LEVEL_STEPS) * len(windows)
         else:
             record["kind"] = 1
@@ -259,6 +263,13 @@ def _place(
         tuple(folds),
         {r: frame for r, frame, _, _ in plans if frame is not None},
     )
+
+
+def steps_of(window: Window | PictureWindow) -> tuple[int, ...]:
+    """Widths of a window's texels, in its finest."""
+    if isinstance(window, PictureWindow):
+        return 1, *(window.per_pixel * step for step in LEVEL_STEPS[:-1])
+    return LEVEL_STEPS
 
 
 def _placed(
@@ -357,7 +368,9 @@ def _flat_windows(
             fineness.fine,
         )
         if on_pixels is not None:
-            known: list[Window | PictureWindow] = [on_pixels] if on_pixels.is_all else [on_pixels, everything]
+            # Only glass and mirrors show what lands beside those pixels, in a part of the picture.
+            beside = [] if on_pixels.is_all else [replace(everything, largest=min(max(picture), fineness.coarse))]
+            known: list[Window | PictureWindow] = [on_pixels, *beside]
             return [*known, *_beyond(everything, seen, extent)]
     fine = light if seen is None else meet(light, grown(seen, 0.02))
     known = [everything]

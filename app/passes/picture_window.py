@@ -99,7 +99,9 @@ def picture_window(
     if np.linalg.det(frame.on_plane(rows)) < 0.0:
         rows = np.array([[1.0, 0.0, 0.0], [0.0, -1.0, size[1]], [0.0, 0.0, 1.0]]) @ rows
         pixels[:, 1] = size[1] - pixels[:, 1]
-    low, high = pixels[seen].min(axis=0), pixels[seen].max(axis=0)
+    # Between what lands in sight and beside it other wavelengths may land.
+    ahead = pixels[found[:, 2] > 0.0]
+    low, high = np.clip([ahead.min(axis=0), ahead.max(axis=0)], 0.0, size)
     margin = _MARGIN * (high - low) + _MARGIN_PIXELS
     low = np.floor(np.maximum(low - margin, 0.0)).astype(int)
     high = np.ceil(np.minimum(high + margin, size)).astype(int)

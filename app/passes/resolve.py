@@ -40,11 +40,11 @@ class Resolve:
         ctx: moderngl.Context,
         targets: int,
         tiles: Sequence[Tile],
-        folds: Sequence[tuple[Tile, Tile]],
+        folds: Sequence[tuple[Tile, Tile, int]],
         charts: Sequence[tuple[Tile, ChartAtlas]],
         by_compute: bool,
     ) -> None:
-        """`tiles` that are read; `folds`: (tile with texels twice as wide, tile); each `ChartAtlas` with its tile."""
+        """`tiles` that are read; `folds` as `MapLayout` has them; each `ChartAtlas` with its tile."""
         self._ctx = ctx
         way = way_of(ctx)
         self._reads_sums, self._reads_scratch = way.in_bulk and by_compute, way.in_bulk and not by_compute
@@ -52,9 +52,9 @@ class Resolve:
         defines: Defines = {"AT_ONCE": self._at_once, "SCRATCH_AT": 2 * self._at_once}
         defines |= switched(FROM_SUMS=self._reads_sums, FROM_SCRATCH=self._reads_scratch) | sum_defines(way)
         extensions = way.extensions if self._reads_sums else ()
-        words, self._groups = tile_words(tiles, {fine: wide for wide, fine in folds})
+        words, self._groups = tile_words(tiles, {fine: (wide, parts) for wide, fine, parts in folds})
         self._tiles = ctx.buffer(words)
-        self._folds: Sequence[tuple[Tile, Tile]] = ()
+        self._folds: Sequence[tuple[Tile, Tile, int]] = ()
         if way.in_bulk:
             self._program = shader.compute(ctx, "light/resolve.comp", defines | {"SIDE": _SIDE}, extensions=extensions)
         else:
@@ -91,9 +91,10 @@ class Resolve:
             if self._seam_program is not None:
                 self._ctx.memory_barrier()
                 self._dispatch(self._seam_program, self._seams, first, parts, self._seam_count, len(own))
-            for wide, fine in self._folds:
+            for wide, fine, parts in self._folds:
                 resolved[first].bind_to_image(0, read=True, write=True)
                 self._program["wide"].value, self._program["fine"].value = wide.rect, fine.rect
+                self._program["even_parts"].value = parts
                 self._ctx.memory_barrier()
                 self._program.run(-(-fine.width // 8), -(-fine.height // 8))
         self._ctx.memory_barrier()
@@ -120,17 +121,18 @@ class Resolve:
         shader.release(self._program, self._seam_program, self._tiles, *self._seams)
 
 
-def tile_words(tiles: Sequence[Tile], wider: Mapping[Tile, Tile]) -> tuple[np.ndarray, int]:
+def tile_words(tiles: Sequence[Tile], wider: Mapping[Tile, tuple[Tile, int]]) -> tuple[np.ndarray, int]:
     """What the program reads of each tile (int32, rows of four), and the number of its work groups."""
     rows: list[tuple[int, int, int, int]] = []
     groups = 0
     for i, tile in enumerate(tiles):
         levels = [tile]
         while levels[-1] in wider:
-            levels.append(wider[levels[-1]])
+            levels.append(wider[levels[-1]][0])
         across, down = -(-tile.width // _SIDE), -(-tile.height // _SIDE)
         following = len(rows) + 1 + len(levels) if i + 1 < len(tiles) else 0
-        rows += [(groups, across, len(levels) - 1, following), *(level.rect for level in levels)]
+        _, parts = wider.get(tile, (tile, 0))
+        rows += [(groups, across, len(levels) - 1 | parts << 8, following), *(level.rect for level in levels)]
         groups += across * down
     return np.array(rows or [(0, 1, 0, 0)], np.int32), groups
 

@@ -61,9 +61,11 @@ const float LEAST_FAN = 0.015;
 // Texels: the texel's own blur knows no perspective, and of shorter footprints it is most of what is drawn.
 const float LEAST_FANNED = 0.75;
 const float MOST_FAN = 3.0;
-// Splats of one and a half texels' standard deviation at least go to a map with texels twice as wide.
-const float BROAD_VARIANCE = 2.25;
+// Splats of a texel's standard deviation at least go to a map with texels twice as wide.
+const float BROAD_VARIANCE = 1.0;
 const int WIDER_LEVELS = 6;
+// `area_of_all`, pixels², from which on whole pixels of the picture show a splat.
+const float WHOLE_PIXELS = 0.3;
 // Three texels of a wider level that is chosen for a splat, over its larger half extent, at most.
 const float LEVEL_REACH = 2.5;
 // What texels twice as wide add to the variance of what is drawn, in their own area: the bilinear interpolation on the
@@ -159,10 +161,18 @@ bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 swee
 }
 
 // A splat broad in every direction is as well drawn in texels twice as wide, for a quarter of the
-// fragments; the maps are put together again when they are read (resolve.comp, bilinearly).
+// fragments; the maps are put together again when they are read (resolve.comp, bilinearly). What only is long shows no
+// more than whole pixels of the picture do.
 // Returns the index of the placement with these texels.
 uint choose_level(uint at, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
     Placement place = placements[at];
+    if (place.kind == PLACED_PICTURE) {
+        Footprint g = footprint_in(placements[place.blurred], photon, middle, sweep);
+        if (area_of_all(g) < WHOLE_PIXELS) return at;
+        f = g;
+        at = place.blurred;
+        place = placements[at];
+    }
     for (int step = 0; step < WIDER_LEVELS; ++step) {
         if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {
             float taken = 0.25 * f.taken + LEVEL_BLUR;

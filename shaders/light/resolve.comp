@@ -52,8 +52,8 @@ void main() {
     imageStore(resolved[target], seams[i].texel, seams[i].share * sum);
 }
 #else
-// A tile: where its work groups begin, how many of them lie side by side, wider tiles; then the rectangles (x0, y0, x1,
-// y1) of it and of those.
+// A tile: where its work groups begin, how many of them lie side by side, wider tiles (and from bit 8 on: of its texels
+// so many along a side share a wider one's evenly); then the rectangles (x0, y0, x1, y1) of it and of those.
 layout(std430, binding = 0) readonly buffer Tiles { ivec4 tiles[]; };
 
 // Texels of a level that the finer ones of a work group take from, in two turns.
@@ -76,13 +76,15 @@ void main() {
     int target = int(gl_WorkGroupID.z), at = 0;
     for (int next = tiles[0].w; next > 0 && uint(tiles[next].x) <= group; next = tiles[next].w) at = next;
     ivec4 head = tiles[at];
+    int even_parts = head.z >> 8;
+    head.z &= 255;
     int own = int(group) - head.x;
     ivec2 corner = SIDE * ivec2(own % head.y, own / head.y);
     int turn = 0;
     for (int level = head.z; level > 0; --level) {
         // What this level's texels are needed for, and what they need themselves.
         ivec2 first = corner, wider_first;
-        for (int l = 0; l < level; ++l) first = first - 1 >> 1;
+        for (int l = 0; l < level; ++l) first = l == 0 && even_parts > 0 ? first / even_parts : first - 1 >> 1;
         wider_first = first - 1 >> 1;
         ivec4 rect = tiles[at + 1 + level];
         for (int i = int(gl_LocalInvocationIndex); i < PATCH * PATCH; i += SIDE * SIDE) {
@@ -98,7 +100,12 @@ void main() {
     ivec2 texel = corner + ivec2(gl_LocalInvocationID.xy);
     if (any(greaterThanEqual(texel, rect.zw - rect.xy))) return;
     vec4 held = held_at(rect.xy + texel, target);
-    if (head.z > 0) held += of_wider(texel, corner - 1 >> 1, 1 - turn);
+    if (even_parts > 0) {
+        ivec2 at = texel / even_parts - corner / even_parts;
+        held += patches[(1 - turn) * PATCH * PATCH + at.y * PATCH + at.x] / float(even_parts * even_parts);
+    } else if (head.z > 0) {
+        held += of_wider(texel, corner - 1 >> 1, 1 - turn);
+    }
     imageStore(resolved[target], rect.xy + texel, held);
 }
 #endif

@@ -237,6 +237,15 @@ float thin_variance(Footprint f) {
     return 0.5 * trace - root;
 }
 
+// Product of the standard deviations of a footprint swept along a quarter of its chord, texels²: what only its sweep
+// makes long shows other wavelengths within a texel.
+float area_of_all(Footprint f) {
+    vec2 e = 0.25 * sqrt(TEXEL_VARIANCE) * f.chord;
+    vec3 areas = vec3(f.axis_s.x * f.axis_t.y - f.axis_s.y * f.axis_t.x, f.axis_s.x * e.y - f.axis_s.y * e.x,
+        f.axis_t.x * e.y - f.axis_t.y * e.x);
+    return length(areas);
+}
+
 vec2 half_extent(SplatRecord splat) {
     if (splat.kind == 1u) return splat.along;
     vec4 part = part_that_fans(splat.fan);

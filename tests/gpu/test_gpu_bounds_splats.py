@@ -215,16 +215,18 @@ def test_pictures_of_a_gpu_are_those_of_the_processor(gpu: Context, gl: Context,
 def test_windows_are_resolved_from_the_widest_texels_on(
     gl: Context, monkeypatch: pytest.MonkeyPatch, in_bulk: bool
 ) -> None:
-    """Three levels, sides that are no multiples, and totals that are resolved in place: as numpy adds them up."""
+    """Four levels, the last in whole pixels, sides that are no multiples, and totals that are resolved in place: as
+    numpy adds them up."""
     monkeypatch.setitem(splat_way._ways, gl.ctx, replace(way_of(gl.ctx), in_bulk=in_bulk))
-    sizes = [(53, 37), (27, 19), (14, 10), (20, 20)]
+    sizes = [(159, 111), (53, 37), (27, 19), (14, 10), (20, 20)]
     tiles, size = pack(sizes)
     rng = np.random.default_rng(5)
     atlas = MapAtlas(gl.ctx, size, np.zeros(0))
     values = rng.uniform(size=(size[1], size[0], 4)).astype(np.float32)
     atlas.ready_totals()
     atlas.total_textures[0].write(values)
-    resolve = Resolve(gl.ctx, 1, [tiles[0], tiles[3]], [(tiles[2], tiles[1]), (tiles[1], tiles[0])], [], False)
+    folds = [(tiles[3], tiles[2], 0), (tiles[2], tiles[1], 0), (tiles[1], tiles[0], 3)]
+    resolve = Resolve(gl.ctx, 1, [tiles[0], tiles[4]], folds, [], False)
     resolve.run(atlas, atlas.total_textures)
     got = np.frombuffer(atlas.total_textures[0].read(), np.float32).reshape(values.shape)
 
@@ -232,8 +234,8 @@ def test_windows_are_resolved_from_the_widest_texels_on(
         x0, y0, x1, y1 = tiles[level].rect
         return values[y0:y1, x0:x1].astype(np.float64)
 
-    want = held(2)
-    for level in (1, 0):
+    want = held(3)
+    for level in (2, 1):
         fine = held(level)
         places = [(np.arange(n) + 0.5) / 2.0 - 0.5 for n in fine.shape[:2]]
         low = [np.floor(place).astype(int) for place in places]
@@ -242,7 +244,8 @@ def test_windows_are_resolved_from_the_widest_texels_on(
         v, u = v[:, None, None], u[None, :, None]
         rows = [(1.0 - u) * want[np.ix_(r, below[1])] + u * want[np.ix_(r, above[1])] for r in (below[0], above[0])]
         want = fine + 0.25 * ((1.0 - v) * rows[0] + v * rows[1])
+    want = held(0) + want.repeat(3, axis=0).repeat(3, axis=1) / 9.0
     x0, y0, x1, y1 = tiles[0].rect
     np.testing.assert_allclose(got[y0:y1, x0:x1], want, rtol=1e-5)
-    x0, y0, x1, y1 = tiles[3].rect
+    x0, y0, x1, y1 = tiles[4].rect
     np.testing.assert_array_equal(got[y0:y1, x0:x1], values[y0:y1, x0:x1])
