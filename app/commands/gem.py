@@ -29,13 +29,15 @@ def gem(options: Gem) -> int:
     from ..base.atomic import check_writable
     from ..base.interrupts import interrupt_flag
     from ..base.progress import ProgressReporter
-    from ..model.optics.gem_report import gem_report
+    from ..model.optics.gem_report import PICTURES, gem_report
 
     output = options.output
     if output is not None:
         if output.suffix.lower() not in SUFFIXES:
             raise UserError(f"cannot write {output}: give a name that ends with one of {', '.join(SUFFIXES)}")
         check_writable(output)
+    if options.picture not in PICTURES:
+        raise UserError(f"--picture '{options.picture}' is unknown; known are {', '.join(PICTURES)}")
     stone = stone_at(find_scene(options.stone), options.object, options.glass, options.up)
     for sentence in stone.notes:
         note(f"{sentence}.")
@@ -115,12 +117,9 @@ def on_table(context: Context, stone: Stone, report: Report, cancelled: Cancelle
 def write(found: GemReport, path: Path, picture: str = "aset") -> None:
     """Write a report (.html), numbers (.json) or one of the pictures (.png). Raises `UserError`."""
     from ..base.atomic import atomic_output
-    from ..model.optics.gem_report import PICTURES
 
     suffix = path.suffix.lower()
     if suffix == ".png":
-        if picture not in PICTURES:
-            raise UserError(f"there is no picture '{picture}' of a stone; give one of {', '.join(PICTURES)}")
         if not found.pictures:
             raise UserError("it was stopped before there was a picture; nothing was written")
         _save_png(found, path, picture)
