@@ -16,7 +16,7 @@ from .search import (
     SUM_DEPOSITED,
     SUM_LEAVES,
     SUM_LEFT,
-    band_power,
+    band_share,
     flux_of,
     halve_space,
     halve_spectrum,
@@ -101,7 +101,7 @@ def stand_still(beam, new, edge, corner, tables, work):
     for a in range(3):
         if passes_at(beam, beam, a) > most:
             chosen, most = a, passes_at(beam, beam, a)
-    held = most * band_power(beam, tables, work)
+    held = most * band_share(beam, tables, work) * beam.boost * work.density
     if held <= 0.0:
         return
     for ln in range(new.edges):

@@ -142,6 +142,14 @@ def band_power(beam, tables, work):
 
 
 @part
+def band_share(beam, tables, work):
+    """Share of the light's power that a beam's band has."""
+    if beam.x[2] <= beam.x[0]:
+        return work.line_share
+    return at_x(tables, work.power + 1, beam.x[2]) - at_x(tables, work.power + 1, beam.x[0])
+
+
+@part
 def power_as(outline, beam, tables, work):
     """Power of a beam with another's outline: its area in q times its weight, over its band."""
     best = most = 0.0

@@ -90,6 +90,33 @@ def test_light_of_a_lamp_keeps_its_power_where_its_beams_are_swept_far() -> None
     assert drawn == pytest.approx(sum(cells(single, 0, grid, x)[0].sum() for x in places), rel=1e-3)
 
 
+def test_every_polygon_draws_the_light_that_it_is_counted_with() -> None:
+    """A red spot near a step cut, whose weakest beams are not straight and are put somewhere by rule: what is drawn
+    has to be what is counted, which no sum of fluxes shows. At most 1.4 % and 3.3 times, where bands end within one."""
+    text = SWEPT["step cut"].split("[[objects]]")
+    spot = """[[lights]]
+name = "spot"
+kind = "spot"
+spectrum = {blackbody = 1500}
+position = [0.3, -0.6, 4.0]
+target = [0.0, 0.0, 0.5]
+half_angle_deg = 12.0
+flux_lm = 100.0
+
+"""
+    rig = Rig(scene_of("[[objects]]".join([spot, *text[1:]])))
+    emission = rig.emissions()[0]
+    swept, _ = rig.polygons(emission, 2e-4)
+    grid, drawn = grid_about(rig, swept, 4), np.zeros(len(swept))
+    ends = np.linspace(0.0, 1.0, 513)
+    shares = np.diff(np.interp(ends, np.linspace(0.0, 1.0, len(emission.watts)), emission.watts))
+    for x, share in zip(0.5 * (ends[1:] + ends[:-1]), shares, strict=True):
+        drawn += share * cells(swept, 0, grid, x, from_hulls=True)[2]
+    seen = swept.flux > 1e-3 * swept.flux.max()
+    assert drawn.sum() == pytest.approx(swept.flux.sum(), rel=0.03)
+    assert (drawn[seen] / swept.flux[seen]).max() < 5.0
+
+
 def test_a_band_across_the_onset_of_total_reflection_is_cut_there() -> None:
     swept, summed, total, total_summed, _ = swept_and_summed(ONSET)
     assert np.abs(swept - summed).max() < BOUND["onset"] * summed.max()
