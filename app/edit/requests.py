@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from ..model.staging import UpAxis
+from ..model.vectors import Vec3
 
 
 class Request:
@@ -197,11 +198,35 @@ class Animate(Request):
 
 @dataclass(frozen=True)
 class MatchGlass(Request):
-    """Find the catalogue's glasses whose light is nearest to what object `index` casts now."""
+    """Find the catalogue's glasses whose light is nearest to what object `index` casts now, or to what is wanted."""
 
     index: int
+    file: Path | None = None
+    """A picture or spectra that are wanted …"""
+    width: float | None = None
+    """… or a width …"""
+    between: tuple[Vec3, ...] = ()
+    """… there: two ends of a line or three corners, world; of the light as it is, empty for the first flat receiver."""
     photons: int = 100_000
     """Of each glass that is tried."""
+
+
+@dataclass(frozen=True)
+class Derive(Request):
+    """The picture's derivative by a parameter."""
+
+    path: str
+    photons: int = 200_000
+
+
+@dataclass(frozen=True)
+class CheckPlate(Request):
+    """Compare what object `index` draws in parallel light with a picture."""
+
+    index: int
+    target: Path
+    distance: float | None = None
+    """Scene units; None: where it is most like."""
 
 
 @dataclass(frozen=True)
@@ -236,5 +261,6 @@ class DismissMessage(Request):
     text: str
 
 
-LongExport = RenderPicture | Bake | Animate | MatchGlass
+Solving = MatchGlass | Derive | CheckPlate
+LongExport = RenderPicture | Bake | Animate | Solving
 Export = Screenshot | LongExport

@@ -87,6 +87,21 @@ class Compare:
 
 
 @dataclass(frozen=True)
+class Solve:
+    """What the panels that solve are set to."""
+
+    parameter: str = ""
+    """By which a derivative is wanted."""
+    wanted: Literal["light", "picture", "width"] = "light"
+    """Of a glass: the light as it is, a picture where the ruler lies, or a width along it."""
+    file: Path | None = None
+    width: float = 0.0
+    plate_target: Path | None = None
+    plate_distance: float = 0.0
+    """0: where it is most like."""
+
+
+@dataclass(frozen=True)
 class Panels:
     """Which windows are open."""
 
@@ -103,6 +118,7 @@ class Panels:
     rays: bool = False
     lens: bool = False
     gem: bool = False
+    solve: bool = False
     lesson: bool = False
     shortcuts: bool = False
     start_page: bool = False
@@ -169,6 +185,7 @@ class State:
     display: Display = Display()
     brush: Brush = Brush()
     compare: Compare = Compare()
+    solve: Solve = Solve()
     preferences: Preferences = Preferences()
     method: str = "srd"
     smoothing: float = 0.45

@@ -16,6 +16,7 @@ from ..edit.parameters import Stage
 from ..gpu.context import Context
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
+from ..model.vectors import Vec3
 from ..passes.plane_frame import plane_frame
 from .bake import placement
 from .frames import FrameRenderer
@@ -28,6 +29,8 @@ _PARTS = 3
 """Along a side of one cell of a target, between which its mean is taken."""
 _CELLS, _NARROW = 64, 32.0
 """Along a side of a target that is the scene as it is; length of a line over the breadth of its strip."""
+_OFF_PLANE = 1e-4
+"""Of a place that lies in a receiver's plane, over its extent."""
 _WIDEST = 0.9
 """Width over the line, at most."""
 
@@ -123,13 +126,17 @@ def glass_called(scene: Scene, name: str) -> int:
     return [item.name for item in scene.objects].index(name)
 
 
-def flat_receiver(scene: Scene) -> str:
-    """The first one. Raises `UserError`."""
-    flat = (o.name for o in scene.objects if o.name in scene.receiver_names and o.mesh.is_flat)
-    found = next(flat, None)
-    if found is None:
-        raise UserError(f"scene '{scene.name}' has no flat receiver, on which light could be compared: add a table")
-    return found
+def flat_receiver(scene: Scene, places: Sequence[Vec3] = ()) -> str:
+    """The first one in whose plane all `places` lie. Raises `UserError`."""
+    flat = [o for o in scene.objects if o.name in scene.receiver_names and o.mesh.is_flat]
+    for item in flat:
+        frame, extent = plane_frame(item.world_vertices), float(np.ptp(item.world_vertices, axis=0).max())
+        away = (np.reshape(places, (-1, 3)) - frame.origin) @ np.cross(*frame.axes)
+        if np.abs(away).max(initial=0.0) <= _OFF_PLANE * extent:
+            return item.name
+    if flat:
+        raise UserError("the ruler does not lie on a flat receiver: click its points there")
+    raise UserError(f"scene '{scene.name}' has no flat receiver, on which light could be compared: add a table")
 
 
 def line(scene: Scene, receiver: str, start: Sequence[float], end: Sequence[float]) -> np.ndarray:

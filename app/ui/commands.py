@@ -322,8 +322,11 @@ PANELS = _group(
     _panel("Timing", "", "timing", "Frame time by pass, photons, memory, fall-backs."),
     _panel("Spectrum", "", "spectrum", "The spectrum under the cursor."),
     _panel("Compare", "", "compare", "Reference, wipe, error map."),
-    _panel("Lens", "", "lens", "Focal lengths, chromatic shift and spots of the selected lens, by wavelength."),
     _panel("Gem", "", "gem", "Light return, fire, scintillation and windows of the selected stone, face up."),
+    _panel(
+        "Lens", "", "lens", "Focal lengths, chromatic shift and spots of the selected lens, by wavelength; a plate."
+    ),
+    _panel("Solve", "", "solve", "The picture's derivative by a number; which glass casts a picture or a width."),
     _panel("Rays", "", "rays", "Deviation and focal length of the ray overlay, by wavelength."),
     _panel("Lesson", "", "lesson", "Six lessons: a scene each, a few sentences, what to try."),
     _panel("History", "", "history", "All steps that can be undone."),

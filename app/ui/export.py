@@ -6,7 +6,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from ..base.atomic import check_writable
 from ..base.errors import UserError
 from ..base.glare import with_glare
 from ..base.image_io import SHOWN_SUFFIXES, SPECTRAL_SUFFIXES, check_finite, check_suffix, write_image
-from ..base.memory import MAX_SIDE_PX, check_picture_memory
+from ..base.memory import check_picture_memory
 from ..edit import requests
 from ..edit.parameters import Stage
 from ..edit.state import Display as DisplaySettings
@@ -25,9 +25,10 @@ from ..model.settings import RenderSettings
 from ..passes.display import Display
 from ..render.export_caustic import PAGE_SUFFIXES
 from ..render.notices import FrameNotices, frame_notices
-from .export_job import Course, ExportJob, Words
+from .export_job import Course, ExportJob, Words, settings_of
 from .file_writer import FileWriter
 from .screenshot import Shown, screenshot, texture_codes, write_codes
+from .solving_jobs import FoundPictures, solving_job
 from .view_model import JobInfo
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ class Exports:
         """`thread`: where jobs work, called when the first begins; None for the caller's own, with `context`."""
         self._context, self._find_thread = context, thread
         self._writer = FileWriter()
+        self.found = FoundPictures(context)
         self._job: ExportJob | None = None
 
     @property
@@ -121,13 +123,14 @@ class Exports:
         if self._job is not None:
             self._job.release()
             self._job = None
+        self.found.release()
         return self._writer.release()
 
     def _made(self, request: requests.LongExport, state: State, exposure_ev: float) -> ExportJob:
         thread = self._find_thread()
         context = self._context if thread is None else thread.context
-        if isinstance(request, requests.MatchGlass):
-            return _matched(context, request, state, thread)
+        if isinstance(request, requests.Solving):
+            return solving_job(context, request, state, thread, self.found)
         size, name, notices = request.size, request.path.name, FrameNotices()
         shown_size = state.viewport_size if isinstance(request, requests.Bake) else size
         stage = Stage(state.scene, state.camera_for(shown_size), exposure_ev, state.solo_nm)
@@ -137,14 +140,14 @@ class Exports:
                 saved = f"Saved {name}: any browser opens it."
                 return ExportJob(Words(f"Page: {name}", saved, _NOTHING.format("a page")), work, notices, thread)
             case requests.Bake():
-                settings = _settings(state, size, photons=request.photons)
+                settings = settings_of(state, size, photons=request.photons)
                 work = _bake(context, request, stage, settings, notices)
                 saved = f"Baked {name}; its place is in {request.path.with_suffix('.json').name}."
                 words = Words(f"Caustic map: {name}", saved, _NOTHING.format("a map"))
                 return ExportJob(words, work, notices, thread)
             case requests.RenderPicture():
                 course = Course()
-                settings = _settings(
+                settings = settings_of(
                     state,
                     size,
                     photons=None if request.seconds is not None else request.photons,
@@ -156,28 +159,12 @@ class Exports:
                 kept = "it is written with the light that it has by then"
                 words = Words(f"Rendering {name}", f"Rendered {name}.", _NOTHING.format("a picture"), kept)
                 return ExportJob(words, work, notices, thread, seconds=request.seconds, course=course)
-        settings = _settings(state, size, photons=request.photons, spp=request.samples)
+        settings = settings_of(state, size, photons=request.photons, spp=request.samples)
         work, frames = _animate(context, request, stage, settings, state, notices)
         title = "Turntable" if request.kind == "turntable" else "Animation"
         saved, kept = f"Saved {name}, {frames} frames.", "the frames that are done stay"
         words = Words(f"{title}: {name}", saved, f"Stopped {name}; {kept}.", kept)
         return ExportJob(words, work, notices, thread, frames)
-
-
-def _settings(state: State, size: tuple[int, int], **changes: Any) -> RenderSettings:
-    """What is shown, in another size and with `changes`."""
-    width, height = size
-    if not (1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX):
-        raise UserError(f"a size of {width} × {height} pixels is out of range: no side may exceed {MAX_SIDE_PX}")
-    return RenderSettings(
-        width=width,
-        height=height,
-        method=state.method,
-        smoothing=state.smoothing,
-        max_depth=state.scene.render.max_depth,
-        local_gain=not state.physical,
-        **changes,
-    )
 
 
 def _render(
@@ -248,31 +235,6 @@ def _bake(
     return bake.bake(context, stage, settings, request.receiver, request.path, notices)
 
 
-def _matched(context: Context, request: requests.MatchGlass, state: State, thread: ContextThread | None) -> ExportJob:
-    """Which glasses come near the light of the scene on its first flat receiver, as a note."""
-    from ..render.light_target import flat_receiver
-    from ..render.solving import solution
-
-    scene, notices = state.scene, FrameNotices()
-    stage, receiver = Stage(scene, scene.camera), flat_receiver(scene)
-    settings = _settings(state, state.viewport_size, photons=request.photons)
-
-    def work() -> Iterator[float]:
-        found = yield from solution(
-            context, stage, settings, receiver, None, None, None, lambda solver: solver.match(request.index, 3)
-        )
-        near = (
-            f"{g.name} (n_d {g.n_d:.4f}, V_d {g.V_d:.1f}) differs by {100.0 * g.error:.2g} %" for g in found.glasses
-        )
-        notices.take(near)
-
-    name = scene.objects[request.index].name
-    words = Words(
-        f"Glass of {name}", f"Glasses that light '{receiver}' most alike:", "No glass was looked for any more."
-    )
-    return ExportJob(words, work(), notices, thread)
-
-
 def _page(context: Context, request: requests.Bake, state: State, exposure_ev: float) -> Iterator[float]:
     from ..render.page.page import check_page, check_page_path, page_size, page_steps, words_of
 
@@ -281,7 +243,7 @@ def _page(context: Context, request: requests.Bake, state: State, exposure_ev: f
     check_page_path(request.path)
     check_page(scene, request.receiver)
     look = {"exposure_ev": scene.render.exposure_ev, "glare": scene.render.glare}
-    settings = _settings(state, size, photons=request.photons, **look)
+    settings = settings_of(state, size, photons=request.photons, **look)
 
     def work() -> Iterator[float]:
         page = yield from page_steps(context, stage, settings, request.receiver, words_of(scene))

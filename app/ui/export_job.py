@@ -7,13 +7,17 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from ..base.errors import UserError
+from ..base.memory import MAX_SIDE_PX
 from ..gpu.context_thread import SteppedWork
+from ..model.settings import RenderSettings
 from ..render.notices import FrameNotices
 from .view_model import JobInfo
 
 if TYPE_CHECKING:
+    from ..edit.state import State
     from ..gpu.context_thread import ContextThread
 
 
@@ -146,6 +150,22 @@ class ExportJob:
         if self._seconds is not None:
             return max(self._seconds - worked, 0.0)
         return None if self._fraction < 0.02 else worked * (1.0 - self._fraction) / self._fraction
+
+
+def settings_of(state: State, size: tuple[int, int], **changes: Any) -> RenderSettings:
+    """What is shown, in another size and with `changes`."""
+    width, height = size
+    if not (1 <= width <= MAX_SIDE_PX and 1 <= height <= MAX_SIDE_PX):
+        raise UserError(f"a size of {width} × {height} pixels is out of range: no side may exceed {MAX_SIDE_PX}")
+    return RenderSettings(
+        width=width,
+        height=height,
+        method=state.method,
+        smoothing=state.smoothing,
+        max_depth=state.scene.render.max_depth,
+        local_gain=not state.physical,
+        **changes,
+    )
 
 
 def left_words(left_s: float, now: datetime) -> str:

@@ -284,6 +284,8 @@ _HANDLERS: dict[type, Callable[[Session, Any], Answer | None]] = {
     requests.Bake: _export,
     requests.Animate: _export,
     requests.MatchGlass: _export,
+    requests.Derive: _export,
+    requests.CheckPlate: _export,
     requests.CancelJob: lambda session, _: session.jobs.cancel_export(),
     requests.ComputeReference: lambda session, _: session.jobs.comparison.restart(),
     requests.CopyMaterial: _copy_material,

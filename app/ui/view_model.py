@@ -85,6 +85,25 @@ class JobInfo:
 
 
 @dataclass(frozen=True)
+class Found:
+    """What a job found, with a picture of it."""
+
+    of: tuple[object, ...]
+    """What it was found for."""
+    rows: tuple[tuple[str, str], ...]
+    codes: np.ndarray
+    """uint8 (h, w, 3), sRGB."""
+    texture: int = 0
+    """Texture id of that."""
+
+    def is_of(self, *now: object) -> bool:
+        """Whether that has not changed since."""
+        plain = str, float, Path
+        pairs = zip(self.of, now, strict=True)
+        return all(a is b or (isinstance(a, plain) and isinstance(b, plain) and a == b) for a, b in pairs)
+
+
+@dataclass(frozen=True)
 class ViewModel:
     """What panels show in one frame."""
 
@@ -138,6 +157,8 @@ class ViewModel:
     """What those rays say in numbers."""
     gem: GemReading = NOT_YET
     """Of the selected stone, while its panel is open."""
+    derivative: Found | None = None
+    plate: Found | None = None
     job: JobInfo | None = None
     engine_rests: bool = False
     """The job has all of the time: it is waited for."""

@@ -1,15 +1,22 @@
-"""The selected lens in numbers: focal lengths, chromatic shift and spots by wavelength."""
+"""The selected lens in numbers (focal lengths, chromatic shift and spots by wavelength), or what a selected caustic
+plate draws, compared with its target."""
 
 from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
 
 from imgui_bundle import imgui
 
 from ...base.errors import UserError
+from ...edit.requests import CheckPlate
 from ...edit.state import State
+from ...model.io.picture_files import PICTURE_SUFFIXES
 from ...model.lens_scene import lens_in
 from ...model.optics.lens_design import HEADINGS, lens_table
 from ..view_model import ViewModel
-from . import widgets
+from . import file_browser, widgets
+from .solve_panel import draw_found
 from .wavelength_table import draw_wavelength_table
 
 
@@ -21,8 +28,36 @@ def draw_lens_panel(state: State, view_model: ViewModel) -> State:
         lens = lens_in(state.scene, None if chosen is None or chosen.material.receives else chosen.name)
         found = lens_table(lens)
     except UserError as error:
+        if chosen is not None and index is not None and chosen.material.is_solid and not chosen.material.is_crystal:
+            return _plate(state, view_model, index)
         widgets.hint(f"{str(error)[:1].upper()}{str(error)[1:]}.")
         return state
     imgui.text_wrapped(f"{lens.name}: {found.summary()}.")
     draw_wavelength_table("Lens", HEADINGS, [(row.wavelength_nm, row.texts()[1:]) for row in found.rows])
     return state
+
+
+def _plate(state: State, view_model: ViewModel, index: int) -> State:
+    """Check object `index`, which is no lens, as a caustic plate."""
+    item = state.scene.objects[index]
+    solve = state.solve
+    widgets.hint(f"{item.name} is no lens. Is it a plate that draws a picture with parallel light?")
+    target, tip = solve.plate_target, "The picture that the plate was made for."
+    if widgets.file_field("Target", "none" if target is None else target.name, tip=tip):
+        folder = view_model.path.parent if view_model.path is not None else Path.home()
+        file_browser.ask(file_browser.Question("Target of the plate", PICTURE_SUFFIXES, target or folder, _with_target))
+    tip = "From the plate's far side to the screen; 0: where the picture is most like the target."
+    distance = widgets.drag("Distance", solve.plate_distance, 0.0, unit="units", tip=tip)
+    state = replace(state, solve=replace(solve, plate_distance=distance))
+    tip = "Compare what it draws in parallel light with the target, and find focus, colours and tolerances."
+    if widgets.button("Check plate", tip=tip, enabled=target is not None and view_model.job is None, width=-1):
+        assert target is not None
+        state = state.asking(CheckPlate(index, target, distance or None))
+    if (found := view_model.plate) is not None:
+        of = item.mesh, item.object_to_world, item.material.dispersion, target, distance or None
+        draw_found(found, is_present=found.is_of(*of))
+    return state
+
+
+def _with_target(state: State, _view_model: ViewModel, path: Path) -> State:
+    return replace(state, solve=replace(state.solve, plate_target=path))

@@ -1,0 +1,118 @@
+"""What solves by derivatives: the picture's derivative by a number of the scene, and which glass casts a light."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from imgui_bundle import imgui
+
+from ...base.image_io import READ_SUFFIXES
+from ...edit.parameters import paths
+from ...edit.requests import Derive, MatchGlass
+from ...edit.state import State
+from .. import theme
+from ..compared_with import glass_object
+from ..view_model import Found, ViewModel
+from . import file_browser, widgets
+
+_WANTED: dict[Literal["light", "picture", "width"], str] = {
+    "light": "The light as it is",
+    "picture": "A picture at the ruler",
+    "width": "A width at the ruler",
+}
+_WANTED_TIPS = {
+    "light": "What the scene casts on its first flat receiver now, after a colour was pulled for example.",
+    "picture": "Press K and click three corners on the receiver: upper left, upper right, lower left; or, for spectra "
+    "in a .csv, both ends of a line.",
+    "width": "Press K and click both ends of a line across the fringe, on the receiver.",
+}
+_WIDE_EM = 40.0
+
+
+def draw_solve(state: State, view_model: ViewModel) -> State:
+    """Draw the panel's contents."""
+    is_wide = imgui.get_content_region_avail().x >= theme.em(_WIDE_EM)
+    if not imgui.begin_table("##solve", 2 if is_wide else 1, imgui.TableFlags_.sizing_stretch_same):
+        return state
+    imgui.table_next_column()
+    state = _derivative(state, view_model)
+    imgui.table_next_column()
+    state = _glass(state, view_model)
+    imgui.end_table()
+    return state
+
+
+def _derivative(state: State, view_model: ViewModel) -> State:
+    kind, index = state.selection.kind, state.selection.index
+    names = [each.name for each in (state.scene.objects if kind == "object" else state.scene.lights)]
+    if kind not in ("object", "light"):
+        widgets.hint("Select an object or a light: by which of its numbers is the picture to be derived?")
+        return state
+    head = f"{kind}s.{names[index]}."
+    known = {path: path.removeprefix(head) for path in paths(state.scene, state.camera) if path.startswith(head)}
+    present = state.solve.parameter if state.solve.parameter in known else next(iter(known))
+    tip = "Of what is selected. Red becomes brighter as it grows, blue darker."
+    chosen = widgets.combo("Derivative by", known, present, tip=tip)
+    state = replace(state, solve=replace(state.solve, parameter=chosen))
+    tip = "Render the picture at either side of a small step, by the same random numbers, and take the difference."
+    if widgets.button("Derive", tip=tip, enabled=view_model.job is None, width=-1):
+        state = state.asking(Derive(chosen))
+    found = view_model.derivative
+    if found is not None:
+        draw_found(found, is_present=found.is_of(state.scene, state.camera, chosen))
+    return state
+
+
+def _glass(state: State, view_model: ViewModel) -> State:
+    index = glass_object(state.scene, state.selection)
+    if index is None:
+        widgets.hint("Nothing in this scene is glass.")
+        return state
+    solve = state.solve
+    wanted = widgets.combo("Wanted", _WANTED, solve.wanted, tip=_WANTED_TIPS[solve.wanted])
+    solve = replace(solve, wanted=wanted)
+    if wanted == "picture":
+        name = "none" if solve.file is None else solve.file.name
+        if widgets.file_field("Target", name, tip="A picture, or a .csv of spectra, a line a place."):
+            _ask("Light that is wanted", (*READ_SUFFIXES, ".csv"), view_model, _with_file)
+    elif wanted == "width":
+        tip = "Full width at half maximum of the light along the ruler's line."
+        solve = replace(solve, width=widgets.drag("Width", solve.width, 0.0, unit="units", tip=tip))
+    state = replace(state, solve=solve)
+    item = state.scene.objects[index]
+    file = solve.file if wanted == "picture" else None
+    missing = (wanted == "picture" and file is None) or (wanted == "width" and solve.width <= 0.0)
+    missing = missing or (wanted != "light" and len(state.measured) < 2)
+    if missing:
+        widgets.hint(_WANTED_TIPS[wanted])
+    ready = not missing and view_model.job is None and not item.material.is_crystal
+    if widgets.button(f"Find the glass of {item.name}###find", tip="Rank the catalogue.", enabled=ready, width=-1):
+        between = () if wanted == "light" else state.measured[: 2 if wanted == "width" else 3]
+        width = solve.width if wanted == "width" else None
+        state = state.asking(MatchGlass(index, file, width, between))
+    return state
+
+
+def _with_file(state: State, _view_model: ViewModel, path: Path) -> State:
+    return replace(state, solve=replace(state.solve, file=path))
+
+
+def _ask(
+    title: str, suffixes: tuple[str, ...], view_model: ViewModel, then: Callable[[State, ViewModel, Path], State]
+) -> None:
+    folder = view_model.path.parent if view_model.path is not None else Path.home()
+    file_browser.ask(file_browser.Question(title, suffixes, folder, then))
+
+
+def draw_found(found: Found, *, is_present: bool) -> None:
+    """What a job found, and a picture of it."""
+    if not is_present:
+        widgets.note("Something has changed since: this was found before.")
+    for label, text in found.rows:
+        widgets.read_out(label[:1].upper() + label[1:], text, tip=text)
+    height, width = found.codes.shape[:2]
+    across = min(imgui.get_content_region_avail().x, float(2 * width))
+    imgui.image(imgui.ImTextureRef(found.texture), imgui.ImVec2(across, across * height / width))

@@ -1,0 +1,165 @@
+"""Jobs of the window that solve (which glass, a derivative, whether a plate draws its picture), and the pictures that
+they found, by the functions that the command line and Python use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import replace
+from threading import Event
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from ..base.colour_maps import signed_codes
+from ..base.tone_map import srgb_oetf
+from ..edit import requests
+from ..edit.parameters import Stage
+from ..render.notices import FrameNotices
+from .export_job import ExportJob, Words, settings_of
+from .view_model import Found
+
+if TYPE_CHECKING:
+    import moderngl
+
+    from ..edit.state import State
+    from ..gpu.context import Context
+    from ..gpu.context_thread import ContextThread
+
+T = TypeVar("T")
+_LARGEST_PX = 480
+"""Longer side of a derivative."""
+_PAUSE_S = 0.02
+
+
+class FoundPictures:
+    """What jobs found, by name: kept on any thread, shown on that of the context."""
+
+    def __init__(self, context: Context) -> None:
+        self._ctx = context.ctx
+        self._found: dict[str, Found] = {}
+        self._textures: dict[str, tuple[Found, moderngl.Texture]] = {}
+
+    def keep(self, name: str, found: Found) -> None:
+        """In place of what was found before."""
+        self._found[name] = found
+
+    def entry(self, name: str) -> Found | None:
+        """With its texture; None while nothing was found."""
+        found = self._found.get(name)
+        if found is None:
+            return None
+        kept = self._textures.get(name)
+        if kept is None or kept[0] is not found:
+            if kept is not None:
+                kept[1].release()
+            height, width = found.codes.shape[:2]
+            rgba = np.concatenate([found.codes, np.full((height, width, 1), 255, np.uint8)], axis=2)
+            kept = self._textures[name] = found, self._ctx.texture((width, height), 4, rgba.tobytes())
+        return replace(found, texture=kept[1].glo)
+
+    def release(self) -> None:
+        """Forget all."""
+        for _, texture in self._textures.values():
+            texture.release()
+        self._textures.clear()
+        self._found.clear()
+
+
+def solving_job(
+    context: Context, request: requests.Solving, state: State, thread: ContextThread | None, found: FoundPictures
+) -> ExportJob:
+    """The job of `request`. Raises `UserError` for what cannot be begun."""
+    notices = FrameNotices()
+    match request:
+        case requests.MatchGlass():
+            words, work = _match(context, request, state, notices)
+        case requests.Derive():
+            words, work = _derive(context, request, state, found)
+        case requests.CheckPlate():
+            words, work = _check(request, state, found, notices)
+    return ExportJob(words, work, notices, thread)
+
+
+def _match(
+    context: Context, request: requests.MatchGlass, state: State, notices: FrameNotices
+) -> tuple[Words, Iterator[float]]:
+    from ..render.light_target import flat_receiver, read_target
+    from ..render.solving import solution
+
+    scene = state.scene
+    stage, receiver = Stage(scene, scene.camera), flat_receiver(scene, request.between)
+    settings = settings_of(state, state.viewport_size, photons=request.photons)
+    values = None if request.file is None else read_target(request.file)
+    wish = receiver, values, request.between or None, request.width
+
+    def work() -> Iterator[float]:
+        found = yield from solution(context, stage, settings, *wish, lambda its: its.match(request.index, 3))
+        notices.take(
+            f"{g.name} (n_d {g.n_d:.4f}, V_d {g.V_d:.1f}) differs by {100.0 * g.error:.2g} %" for g in found.glasses
+        )
+
+    name = scene.objects[request.index].name
+    lit = f"Glasses that light '{receiver}' most alike:"
+    return Words(f"Glass of {name}", lit, "No glass was looked for any more."), work()
+
+
+def _derive(
+    context: Context, request: requests.Derive, state: State, found: FoundPictures
+) -> tuple[Words, Iterator[float]]:
+    from ..render.gradient import check_path, gradient
+
+    width, height = state.viewport_size
+    scale = min(1.0, _LARGEST_PX / max(width, height))
+    size = max(1, round(width * scale)), max(1, round(height * scale))
+    stage = Stage(state.scene, state.camera_for(size), 0.0, state.solo_nm)
+    check_path(stage, request.path)
+    settings = settings_of(state, size, photons=request.photons)
+    of = state.scene, state.camera, request.path
+
+    def work() -> Iterator[float]:
+        its = (yield from gradient(context, stage, settings, [request.path])).derivatives[0]
+        rows = (("By", its.path), ("Step", f"{its.step:.3g} to either side"))
+        found.keep("derivative", Found(of, rows, signed_codes(its.picture.rgb)))
+
+    words = f"Derivative by {request.path}", "The derivative is in the Solve panel.", "No derivative was found."
+    return Words(*words), work()
+
+
+def _check(
+    request: requests.CheckPlate, state: State, found: FoundPictures, notices: FrameNotices
+) -> tuple[Words, Iterator[float]]:
+    from ..model.io.picture_files import read_picture
+    from ..model.optics.caustic_plate import plate_of
+    from ..model.plate_check import check_plate
+
+    item = state.scene.objects[request.index]
+    glass, mesh = item.material.dispersion, item.mesh.transformed(item.object_to_world)
+    rgb, notes = read_picture(request.target)
+    notices.take(notes)
+    plate_of(mesh, glass, 1)  # what is no plate is said at once
+    of = item.mesh, item.object_to_world, glass, request.target, request.distance
+
+    def work() -> Iterator[float]:
+        report = yield from _on_thread(
+            lambda progress, stopped: check_plate(mesh, glass, rgb, request.distance, progress, stopped)
+        )
+        codes = np.round(255.0 * srgb_oetf(np.clip(report.pictures(), 0.0, 1.0))).astype(np.uint8)
+        found.keep("plate", Found(of, report.rows(), codes))
+
+    name = f"{item.name} against {request.target.name}"
+    return Words(f"Plate {name}", f"Checked {name}: see the Lens panel.", "The plate was not checked."), work()
+
+
+def _on_thread(work: Callable[[Callable[[float, str], None], Callable[[], bool]], T]) -> Generator[float, None, T]:
+    """What `work` returns, done on a thread of its own so that the window goes on; closed, it is told to stop."""
+    shares, stop = [0.0], Event()
+    with ThreadPoolExecutor(1) as pool:
+        future = pool.submit(work, lambda share, _: shares.append(share), stop.is_set)
+        try:
+            while not future.done():
+                wait([future], _PAUSE_S)
+                yield shares[-1]
+        finally:
+            stop.set()
+    return future.result()
