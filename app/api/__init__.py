@@ -72,8 +72,8 @@ __all__ = [
 
 
 def load(source: str | os.PathLike[str] | Mapping[str, Any]) -> Scene:
-    """The scene in a file (.toml, .glb, .gltf, a mesh: .ply, .obj, .stl, or a lens: .zmx, .csv), a shipped one by its
-    name ("prism"), or one from its tables in a dictionary.
+    """The scene in a file (.toml, .glb, .gltf, a mesh: .ply, .obj, .stl, a stone: .asc, or a lens: .zmx, .csv), a
+    shipped one by its name ("prism"), or one from its tables in a dictionary.
 
     Raises `UserError`, in one sentence with file, key and remedy, for anything that cannot be rendered.
     """

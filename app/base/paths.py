@@ -8,7 +8,8 @@ from pathlib import Path
 
 import platformdirs
 
-SCENE_SUFFIXES = (".toml", ".glb", ".gltf", ".ply", ".obj", ".stl", ".zmx", ".csv")
+MESH_SUFFIXES = (".ply", ".obj", ".stl", ".asc")
+SCENE_SUFFIXES = (".toml", ".glb", ".gltf", *MESH_SUFFIXES, ".zmx", ".csv")
 CONFIG_ENVIRONMENT = "SPECTRASPLAT_CONFIG"
 _PACKAGE = Path(__file__).resolve().parents[1]
 

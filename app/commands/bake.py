@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from ..base.errors import UserError
 from ..base.interrupts import Interruption, interrupt_flag
 from .opened import note_assumptions, open_scene, settings_for
 from .printing import note
@@ -40,8 +41,11 @@ def bake_texture(options: Bake) -> int:
 
 def export(options: Export) -> int:
     """Bake and write; returns the exit code. Raises `UserError`."""
+    from ..model.gems.facet_design import SUFFIX as DESIGN_SUFFIX
     from ..render.export_caustic import PAGE_SUFFIXES, check_export, write_export
 
+    if options.output.suffix.lower() == DESIGN_SUFFIX:
+        return _design(options)
     if options.output.suffix.lower() in PAGE_SUFFIXES:
         check_export(options.output, options.plane, options.source)
         return _page(options)
@@ -53,6 +57,21 @@ def export(options: Export) -> int:
 
     others = ", ".join(path.name for path in outputs[1:])
     return _baked(options, outputs, write, f"the caustic on '{options.receiver}'", f"next to it {others}")
+
+
+def _design(options: Export) -> int:
+    """Write a stone's faceting design; returns the exit code. Raises `UserError`."""
+    from ..model.gems.facet_design import write_asc
+    from ..model.gems.from_mesh import design_in
+
+    given = {"--plane": options.plane, "--source": options.source, "--size": options.size, "--photons": options.photons}
+    for option, value in given.items():
+        if value:
+            raise UserError(f"{option} does not go with {options.output.name}: a design is a stone's facets, not light")
+    design, words = design_in(open_scene(options), options.receiver)
+    write_asc(design, options.output)
+    print(f"{options.output.resolve()}: {words}")
+    return 0
 
 
 def _page(options: Export) -> int:

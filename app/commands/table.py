@@ -407,13 +407,17 @@ class Bake(BakesCaustic):
 
 @dataclass(frozen=True, kw_only=True)
 class Export(BakesCaustic):
-    """Export the caustic on an object to glTF or USD, as a cookie for game engines, or as a page for browsers."""
+    """Export the caustic on an object to glTF or USD, as a cookie for game engines, or as a page for browsers; or a
+    stone's faceting design."""
 
-    receiver: str = argument("RECEIVER", "The diffuse object whose caustic is exported.", complete=completion.receivers)
+    receiver: str = argument(
+        "RECEIVER", "The diffuse object whose caustic is exported, or a stone.", complete=completion.receivers
+    )
     output: Path = target(
         "OUT",
         "The receiver with its caustic as emission: .glb, .gltf, .usda, .usdc, .usd; or a spot light's cookie: "
-        ".png, .exr. Numbers are written to a .json next to it. Or a page whose dispersion can be dragged: .html.",
+        ".png, .exr. Numbers are written to a .json next to it. Or a page whose dispersion can be dragged: .html. "
+        "Of a stone, its facets as GemCad reads them: .asc.",
     )
     plane: bool = switch("Only the rectangle that is lit, as bright as on a white receiver.")
     source: tuple[float, float, float] | None = option(

@@ -14,13 +14,12 @@ import numpy as np
 
 from ..base import files
 from ..base.errors import UserError
-from ..base.paths import assets_dir
+from ..base.paths import MESH_SUFFIXES, assets_dir
 from ..model.io.gltf import CAMERA_ADDED
 from ..model.io.gltf_write import save_gltf
 from ..model.io.scene_file import GLTF_SUFFIXES, load_scene
 from ..model.io.scene_save import save_scene
 from ..model.scene import Scene
-from ..model.scene_objects import MESH_SUFFIXES
 from ..model.staging import UpAxis
 from .history import History
 from .opening import AS_FOUND, Opening, open_scene

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from ..base.errors import UserError
+from ..base.paths import MESH_SUFFIXES
 from ..model.io.bare_mesh import objects_of_mesh
 from ..model.scene import Scene
 from ..model.scene_checks import check_scene
 from ..model.scene_defaults import environment_of
-from ..model.scene_objects import MESH_SUFFIXES
 from ..model.staging import AS_FOUND
 from .adding import beside
 from .names import free_name

@@ -15,6 +15,7 @@ import numpy as np
 
 from ..base import files
 from ..base.errors import UserError
+from ..base.paths import MESH_SUFFIXES
 from .geometry import primitives
 from .geometry.mesh import Mesh, note_recipe
 from .geometry.mesh_normals import ROUND_DEG, with_plausible_normals
@@ -27,7 +28,6 @@ from .placement import read_placement
 from .scene import Material, SceneObject
 from .texture import TextureReader
 
-MESH_SUFFIXES = (".ply", ".obj", ".stl")
 INLINE = "inline"
 """Shape of triangles that stand in the scene file itself."""
 

@@ -33,8 +33,8 @@ def check_export(path: Path, plane: bool = False, source: Sequence[float] | None
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
         raise UserError(
-            f"cannot export to {path}: use .glb or .gltf, .usda, .usdc or .usd, .png or .exr for a spot's cookie, or "
-            ".html for a page"
+            f"cannot export to {path}: use .glb or .gltf, .usda, .usdc or .usd, .png or .exr for a spot's cookie, "
+            ".html for a page, or .asc for a stone's facets"
         )
     if suffix in PAGE_SUFFIXES and plane:
         raise UserError(f"--plane does not go with a page, {path.name}: it belongs to .glb and .usd files")

@@ -183,7 +183,8 @@ COMMANDS: tuple[Command, ...] = (
             "Open…",
             "Ctrl+O",
             dialogs.open_file,
-            "Open a scene (.toml), glTF (.glb, .gltf), a bare mesh (.obj, .ply, .stl) or a lens (.zmx, .csv).",
+            "Open a scene (.toml), glTF (.glb, .gltf), a bare mesh (.obj, .ply, .stl), a faceting "
+            "design (.asc) or a lens (.zmx, .csv).",
         ),
         _row(
             "Import…",

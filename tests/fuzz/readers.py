@@ -94,6 +94,15 @@ def _lens_tables() -> tuple[bytes, ...]:
     return shipped, b"curvature;diameter;thickness;glass\n.1;1;1;1.5/60\n0;1;;\n"
 
 
+def _designs() -> tuple[bytes, ...]:
+    shipped = (assets_dir() / "gems" / "trillion.asc").read_bytes()
+    from tests.unit.test_facet_designs import SQUARE
+
+    return shipped, SQUARE.replace("24 n P1", "24 n P 1\n").replace("72 96\na 0", "72 96 G to\nmeet\na 0").encode(
+        "utf-16"
+    )
+
+
 def _zemax() -> tuple[bytes, ...]:
     from tests.unit.test_lenses import ZEMAX
 
@@ -464,6 +473,7 @@ READERS = {
     "mtl": Reader("own.mtl", _materials, _material_texts),
     "ply": Reader("mesh.ply", _mesh, _plys),
     "stl": Reader("mesh.stl", _mesh, _stls),
+    "design": Reader("stone.asc", _scene, _designs),
     "png": Reader("picture.png", _picture, _pngs),
     "jpeg": Reader("picture.jpg", _picture, _jpegs),
     "hdr": Reader("picture.hdr", _picture, _hdrs),

@@ -168,7 +168,11 @@ class _Reader:
             self.is_begun = True
         elif not words.startswith(";"):
             found = _RECORD.match(words)
-            if found is None or (found[1] in "gG" and self.tiers and not _is_number(words[found.end() :])):
+            if (
+                found is None
+                or (self.tiers and self.tiers[-1].awaits_name)
+                or (found[1] in "gG" and self.tiers and not _is_number(words[found.end() :]))
+            ):
                 self._go_on(words)
             else:
                 self._record(found[1].casefold(), words[found.end() :].strip())
@@ -273,7 +277,7 @@ class _OpenTier:
         self.names: dict[int, str] = {}
         """By place among the indices, -1 before the first."""
         self.instructions: list[str] = []
-        self._awaits_name = self._is_in_name = False
+        self.awaits_name = self._is_in_name = False
 
     def take(self, words: str, fail: Callable[[str], NoReturn]) -> None:
         """Indices, names behind `n` and, behind `G`, instructions."""
@@ -284,10 +288,10 @@ class _OpenTier:
             return
         for word in (words_left := iter(words.split())):
             place = len(self.indices) - 1
-            if self._awaits_name:
-                self.names[place], self._awaits_name, self._is_in_name = word, False, True
+            if self.awaits_name:
+                self.names[place], self.awaits_name, self._is_in_name = word, False, True
             elif word in "nN":
-                self._awaits_name = True
+                self.awaits_name = True
             elif word in "gG":
                 self.instructions.append(" ".join(words_left))
             elif _is_number(word):

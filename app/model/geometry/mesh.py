@@ -159,7 +159,7 @@ class Mesh:
         None when the mesh is open, concave, smooth, or has more than MAX_CONVEX_PLANES
         distinct planes. Coplanar triangles share a plane.
         """
-        return _convex_planes(self)
+        return convex_planes_of(self)
 
 
 def make_mesh(
@@ -242,7 +242,8 @@ def _frozen(array: np.ndarray) -> np.ndarray:
     return array
 
 
-def _convex_planes(mesh: Mesh) -> np.ndarray | None:
+def convex_planes_of(mesh: Mesh, most: int = MAX_CONVEX_PLANES) -> np.ndarray | None:
+    """As `Mesh.convex_planes`, up to `most` of them."""
     area_vectors = mesh.area_vectors()
     areas = np.linalg.norm(area_vectors, axis=1)
     normals = normalised(area_vectors)
@@ -264,7 +265,7 @@ def _convex_planes(mesh: Mesh) -> np.ndarray | None:
     left = np.flatnonzero(solid)
     left = left[np.argsort(-areas[left], kind="stable")]  # the largest triangle knows its plane best
     while len(left):
-        if len(planes) == MAX_CONVEX_PLANES:
+        if len(planes) == most:
             return None
         normal, offset = normals[left[0]], normals[left[0]] @ centroids[left[0]]
         beyond = np.abs(corners[left] @ normal - offset).max(axis=1)

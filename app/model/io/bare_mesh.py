@@ -15,6 +15,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from ..gems.facet_design import SUFFIX as DESIGN_SUFFIX
+from ..gems.stone import stone_of
 from ..geometry.mesh import Mesh
 from ..geometry.mesh_health import connected_roots, forms_of, weld_map
 from ..materials.dielectric import DEFAULT_GLASS
@@ -33,6 +35,8 @@ def objects_of_mesh(path: Path, staging: Staging, notes: list[str]) -> list[Scen
     Parts are glass where the file's materials say so, and the others diffuse. Where none says so, as in most files, all
     of it is made of glass, since nobody opens a mesh here to see it grey. Raises UserError for what cannot be read.
     """
+    if path.suffix.lower() == DESIGN_SUFFIX:
+        return with_glass([stone_of(path, staging, notes)], staging, path.name, [""])
     whole, groups = load_grouped_mesh(path)
     parts = parts_of_mesh(whole, groups)
     libraries = () if groups is None else groups.libraries

@@ -1,4 +1,4 @@
-"""Mesh files in and out: PLY, OBJ and STL, with one sentence for everything in a file that is wrong.
+"""Mesh files in and out: PLY, OBJ, STL and faceting designs, with one sentence for everything in a file that is wrong.
 
 The readers are our own rather than trimesh's: that one takes an OBJ's face 0 for its last
 vertex, splits vertices where a normal differs (which opens solids), and costs half a
@@ -14,12 +14,14 @@ import numpy as np
 
 from ...base import files
 from ...base.errors import UserError
+from ...base.paths import MESH_SUFFIXES
+from ..gems.facet_design import SUFFIX as DESIGN_SUFFIX
+from ..gems.facet_design import read_asc
 from ..geometry.mesh import Mesh, make_mesh
 from ..geometry.mesh_health import weld_map
 from ..geometry.mesh_normals import with_smooth
 from .mesh_raw import Groups, RawMesh
 
-MESH_SUFFIXES = (".ply", ".obj", ".stl")
 MAX_COORDINATE = 1e30
 """As for numbers in a scene file: far enough from where squares and float32 overflow."""
 
@@ -44,6 +46,8 @@ def load_mesh(path: str | os.PathLike[str], smooth: bool | float | None = None, 
 
 def load_grouped_mesh(path: Path, name: str | None = None) -> tuple[Mesh, Groups | None]:
     """As `load_mesh` with the file's own normals, and the parts that the file names where its format can."""
+    if path.suffix.lower() == DESIGN_SUFFIX:
+        return read_asc(path).mesh(name or path.stem, str(path)), None
     raw = _read(path)
     mesh = make_mesh(name or path.stem, raw.vertices, raw.triangles, raw.corner_normals, raw.uv, str(path))
     if len(far := np.flatnonzero((np.abs(mesh.vertices) > MAX_COORDINATE).any(axis=1))):

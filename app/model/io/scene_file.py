@@ -14,7 +14,7 @@ from typing import Any
 
 from ...base import files
 from ...base.errors import UserError
-from ...base.paths import SCENE_SUFFIXES
+from ...base.paths import MESH_SUFFIXES, SCENE_SUFFIXES
 from ..geometry.mesh import Mesh
 from ..lights.light_file import read_light
 from ..materials.material_file import read_materials
@@ -34,7 +34,7 @@ from ..scene_defaults import (
     studio_lights,
 )
 from ..scene_environment import read_environment
-from ..scene_objects import MESH_SUFFIXES, ObjectReader
+from ..scene_objects import ObjectReader
 from ..scene_render import read_render
 from ..staging import AS_FOUND, Staging, with_glass
 from ..texture import Environment, TextureReader
@@ -47,8 +47,8 @@ GLTF_SUFFIXES = (".glb", ".gltf")
 
 
 def load_scene(path: str | os.PathLike[str], staging: Staging = AS_FOUND) -> Scene:
-    """The scene in `path` (.toml, .glb, .gltf, a mesh: .ply, .obj, .stl, or a lens: .zmx, .csv), with what `staging`
-    asks for.
+    """The scene in `path` (.toml, .glb, .gltf, a mesh: .ply, .obj, .stl, a stone: .asc, or a lens: .zmx, .csv), with
+    what `staging` asks for.
 
     Raises UserError, in one sentence with file, key and remedy, for anything that cannot be
     rendered as it stands.
