@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from ..render.page.page import Page
 
 _MADE = "made.json"
+_MAKERS = (assets_dir() / "page", Path(__file__).parents[1] / "render" / "page")
+"""Folders of what a page is made with and shown by."""
 
 
 @dataclass(frozen=True)
@@ -97,8 +99,8 @@ def _entries(wanted: Sequence[str]) -> Iterator[_Entry]:
 def _key(entry: _Entry, options: Gallery) -> str:
     """Another one where the page would be another."""
     said = [__version__, options.photons, entry.title, entry.words, list(entry.steps)]
-    scripts = b"".join(path.read_bytes() for path in sorted((assets_dir() / "page").iterdir()))
-    return hashlib.sha256(entry.path.read_bytes() + scripts + json.dumps(said).encode()).hexdigest()[:16]
+    makers = b"".join(path.read_bytes() for folder in _MAKERS for path in sorted(folder.glob("*.*")))
+    return hashlib.sha256(entry.path.read_bytes() + makers + json.dumps(said).encode()).hexdigest()[:16]
 
 
 def _made(folder: Path) -> dict[str, dict[str, Any]]:

@@ -7,11 +7,13 @@ import { inverse } from "./views.js";
 
 // What is missing for it, as a sentence; null where nothing is.
 export function lackOf(gl) {
-  if (!gl) return "This browser shows no WebGL2, which the live picture needs: below is a still. Any current Firefox, Chrome, Edge or Safari has it, if hardware acceleration is switched on.";
+  if (!gl) return "This browser shows no WebGL2, which the live picture needs. Any current Firefox, Chrome, Edge or Safari has it, if hardware acceleration is switched on.";
   if (!gl.getExtension("EXT_color_buffer_float") && !gl.getExtension("EXT_color_buffer_half_float"))
-    return "This device cannot draw into floating-point pictures (EXT_color_buffer_float), which adding up light needs: below is a still.";
+    return "This device cannot draw into floating-point pictures (EXT_color_buffer_float), which adding up light needs.";
   return null;
 }
+
+const FEWEST = 4000; // photons that stand for all
 
 export class Light {
   // `records`: rows of photons and beams (records.js).
@@ -37,9 +39,8 @@ export class Light {
     this.things = [[this.splats, photons, PHOTON], [this.beams, beams, BEAM]].filter(([, { count }]) => count).map(([kind, { rows, count }, floats]) => {
       const records = this.texture();
       this.fill(records, (ABREAST * floats) / 4, Math.ceil(count / ABREAST), rows);
-      return { kind, records, count };
+      return { kind, records, count, quads: this.corners(count) };
     });
-    this.quads = this.corners(Math.max(photons.count, beams.count));
     if (beams.count) this.fill(this.edges, 1024, beams.edges.length / 4096, beams.edges);
     this.meshes = this.solids(head, array);
   }
@@ -99,10 +100,12 @@ export class Light {
     gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
   }
 
-  // Two triangles each, of four corners; instances of so few are slow on many a device.
+  // Two triangles each, of four corners; instances of so few are slow on many a device. Every sixteenth comes first,
+  // then every fourth: so many can stand for all.
   corners(count) {
-    const { gl } = this, vertices = gl.createVertexArray(), list = new Uint32Array(6 * count);
-    for (let i = 0; i < list.length; i++) list[i] = 4 * Math.floor(i / 6) + [0, 1, 2, 2, 1, 3][i % 6];
+    const { gl } = this, vertices = gl.createVertexArray(), list = new Uint32Array(6 * count), rank = (i) => (i % 4 ? 2 : i % 16 ? 1 : 0);
+    for (let pass = 0, at = 0; pass < 3; pass++)
+      for (let i = 0; i < count; i++) if (rank(i) === pass) for (const corner of [0, 1, 2, 2, 1, 3]) list[at++] = 4 * i + corner;
     gl.bindVertexArray(vertices);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, list, gl.STATIC_DRAW);
@@ -149,8 +152,9 @@ export class Light {
     gl.uniformMatrix3fv(at("to_texel"), true, this.toTexel);
   }
 
-  // Add up all light as it is seen by `toUv` (views.js) on so many pixels, or every `step`-th of them.
-  gather(toUv, width, height, step = 1) {
+  // Add up all light as it is seen by `toUv` (views.js) on so many pixels, or every `step`-th of them; `thin`: by one
+  // photon in 1, 4 or 16, as much wider and brighter.
+  gather(toUv, width, height, step = 1, thin = 1) {
     const { gl, head } = this;
     // Sizes that all levels divide.
     this.size = [width, height].map((side) => Math.max(32, 32 * Math.ceil(side / step / 32)));
@@ -165,14 +169,17 @@ export class Light {
     gl.clearColor(0, 0, 0, 0);
     gl.clear(gl.COLOR_BUFFER_BIT);
     gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE);
-    gl.bindVertexArray(this.quads);
-    for (const { kind, records, count } of this.things) {
+    gl.blendFunc(gl.CONSTANT_COLOR, gl.ONE);
+    for (const { kind, records, count, quads } of this.things) {
+      const share = [thin, thin / 4].find((k) => kind === this.splats && k > 1 && count > FEWEST * k) ?? 1;
+      const drawn = Math.ceil(count / share), each = count / drawn;
+      gl.bindVertexArray(quads);
+      gl.blendColor(each, each, each, each);
       this.use(kind, { records, paths: this.paths, light: this.light, edges: this.edges });
       gl.uniform2f(kind.at("support"), ...this.tables.support);
       gl.uniform1i(kind.at("lines"), this.tables.lineCount);
-      if (kind === this.splats) gl.uniform1f(kind.at("smoothing"), head.photons.smoothing);
-      gl.drawElements(gl.TRIANGLES, 6 * count, gl.UNSIGNED_INT, 0);
+      if (kind === this.splats) gl.uniform1f(kind.at("smoothing"), head.photons.smoothing * Math.sqrt(each));
+      gl.drawElements(gl.TRIANGLES, 6 * drawn, gl.UNSIGNED_INT, 0);
       this.counts.draws++;
     }
     gl.disable(gl.BLEND);
@@ -205,7 +212,6 @@ export class Light {
     this.use(this.view, { map: this.map.texture, base: this.base, weight: this.weight, glass: this.glass.texture });
     gl.uniform2f(this.view.at("pixels"), width, height);
     gl.uniform1i(this.view.at("view"), mode);
-    gl.uniform4f(this.view.at("window"), head.window.u0, head.window.v0, head.window.u1, head.window.v1);
     gl.uniform4f(this.view.at("whites"), head.camera?.base_white ?? 0, head.camera?.weight_white ?? 0, 2 ** exposure, 0);
     gl.uniform3f(this.view.at("diffuse"), ...(head.reflectance_rgb ?? [1, 1, 1]).map((r) => r / Math.PI));
     gl.uniform4f(this.view.at("mark"), ...(mark ?? [0, 0]), mark ? 1 : 0, Math.max(4, width / 90));

@@ -4,8 +4,7 @@ import { COUNT, FIRST_NM, LAST_NM, valueAt } from "./spectra.js";
 
 // Colour of a wavelength on a screen, by the observer's own table (linear Rec.709 up to a factor).
 export function coloursOf(observer) {
-  let most = 0;
-  for (const value of observer) most = Math.max(most, value);
+  const most = observer.reduce((a, b) => Math.max(a, b));
   return Array.from({ length: COUNT }, (_, i) => {
     const rgb = [0, 1, 2].map((c) => observer[3 * i + c] / most), white = Math.max(-Math.min(...rgb), 0);
     const top = Math.max(...rgb) + white, bright = Math.min(Math.max(1.6 * top, 0.08), 1);
@@ -24,9 +23,9 @@ export function nmUnder(canvas, event) {
 }
 
 function begin(canvas) {
-  const ratio = window.devicePixelRatio || 1, width = canvas.clientWidth, height = canvas.clientHeight, pen = canvas.getContext("2d");
-  canvas.width = Math.round(width * ratio);
-  canvas.height = Math.round(height * ratio);
+  const ratio = window.devicePixelRatio || 1, pen = canvas.getContext("2d");
+  const width = canvas.clientWidth, height = canvas.clientHeight;
+  Object.assign(canvas, { width: Math.round(width * ratio), height: Math.round(height * ratio) });
   pen.scale(ratio, ratio);
   pen.font = "11px system-ui, sans-serif";
   pen.fillStyle = pen.strokeStyle = getComputedStyle(canvas).color;
@@ -53,8 +52,7 @@ export function drawIndex(canvas, shown, own, nm, colours) {
   const plot = begin(canvas), { pen, width, height } = plot, floor = height - BOTTOM;
   let low = Math.min(...shown, ...own), high = Math.max(...shown, ...own);
   const margin = Math.max(0.08 * (high - low), 0.002);
-  low -= margin;
-  high += margin;
+  [low, high] = [low - margin, high + margin];
   const up = (n) => floor - ((n - low) / (high - low)) * (floor - TOP);
   pen.textAlign = "right";
   pen.globalAlpha = 0.7;
@@ -64,30 +62,28 @@ export function drawIndex(canvas, shown, own, nm, colours) {
     values.forEach((n, i) => pen.lineTo(across(width, FIRST_NM + i), up(n)));
     pen.stroke();
   };
-  pen.lineWidth = 1;
   pen.setLineDash([3, 3]);
   curve(own);
   pen.setLineDash([]);
   pen.globalAlpha = 1;
-  pen.lineWidth = 1.2;
   curve(shown);
   for (let i = 0; i < COUNT - 1; i += 2) {
     pen.fillStyle = colours[i];
     pen.fillRect(across(width, FIRST_NM + i), up(shown[i]) - 2, (2 * (width - LEFT - RIGHT)) / COUNT + 0.6, 4);
   }
   pen.fillStyle = getComputedStyle(canvas).color;
-  if (nm !== null) reading(plot, nm, up(valueAt(shown, nm)));
+  reading(plot, nm, up(valueAt(shown, nm)));
 }
 
 // Bars of 10 nm, by the tallest.
 export function drawSpectrum(canvas, found, nm, colours) {
   const plot = begin(canvas), { pen, width, height } = plot, floor = height - BOTTOM;
-  const most = Math.max(1e-30, ...(found ?? []).map(({ power }) => power));
-  for (const bin of found ?? []) {
+  const most = Math.max(1e-30, ...found.map(({ power }) => power));
+  for (const bin of found) {
     const left = across(width, bin.nm - 5), tall = (bin.power / most) * (floor - TOP);
     pen.fillStyle = colours[Math.round(bin.nm) - FIRST_NM];
     pen.fillRect(left, floor - tall, across(width, bin.nm + 5) - left - 1, tall);
   }
   pen.fillStyle = getComputedStyle(canvas).color;
-  if (found && nm !== null) reading(plot, nm);
+  reading(plot, nm);
 }

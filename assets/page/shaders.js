@@ -506,7 +506,6 @@ uniform sampler2D weight;   // camera: share of the receiver's light in each pix
 uniform sampler2D glass;    // in space: the glass as it is seen
 uniform vec2 pixels;
 uniform int view;           // 0 camera, 1 from above, 2 in space
-uniform vec4 window;        // where light of the glass lands
 uniform vec4 whites;        // of base, of weight; 2^exposure; 0
 uniform vec3 diffuse;       // reflectance / pi
 uniform vec4 mark;          // where the finger is: pixels right, down; 1 if it is
@@ -548,10 +547,8 @@ void main() {
     vec2 at = pixel / pixels;
     rgb = whites.x * pow(texture(base, at).rgb, vec3(2.4)) + whites.y * texture(weight, at).rgb * rgb;
   } else {
-    // A faint light shows where the receiver is: its window brighter than what is beyond.
-    vec2 uv = uvw.xy / uvw.z;
-    bool inside = uvw.z > 0.0 && all(greaterThan(uv, window.xy)) && all(lessThan(uv, window.zw));
-    rgb = diffuse * rgb + (inside ? 0.012 : view == 2 && uvw.z > 0.0 ? 0.006 : 0.002) / whites.z;
+    // A faint light shows where the receiver's plane is.
+    rgb = diffuse * rgb + (uvw.z > 0.0 ? 0.012 : 0.002) / whites.z;
   }
   vec3 display = encoded(tone(rgb * whites.z));
   if (view == 2) {

@@ -112,7 +112,7 @@ class Browser:
         return message
 
     def _note(self, method: str, parameters: dict[str, Any]) -> None:
-        if method == "Network.requestWillBeSent":
+        if method == "Network.requestWillBeSent" and not parameters["request"]["url"].startswith("data:"):
             self.requests.append(parameters["request"]["url"])
         elif method == "Runtime.exceptionThrown":
             self.mistakes.append(str(parameters["exceptionDetails"].get("exception", {}).get("description")))

@@ -26,10 +26,10 @@ BALL = {
 LEVELS = 6
 
 
-def gathered(browser: Browser, to_uv: np.ndarray, width: int, height: int) -> np.ndarray:
+def gathered(browser: Browser, to_uv: np.ndarray, width: int, height: int, thin: int = 1) -> np.ndarray:
     """Irradiance on the receiver (height, width, 3) that pixels show, top row first; `to_uv`: matrix of views.js. Sides
-    are multiples of 32."""
-    browser.run(f"spectrasplat.light.gather({np.ravel(to_uv).tolist()}, {width}, {height})")
+    are multiples of 32. `thin`: by one photon in so many."""
+    browser.run(f"spectrasplat.light.gather({np.ravel(to_uv).tolist()}, {width}, {height}, 1, {thin})")
     read = "(window.m = spectrasplat.light.readMap(), [m.width, m.height, m.stride])"
     assert browser.run(read)[:2] == [width, height], "sides are multiples of 32"
     stored = browser.floats("window.m.values").reshape(height, -1, 4)[..., :3].astype(float)

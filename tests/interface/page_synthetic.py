@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 from spectrasplat.render.page.document import document
 
 NM = np.arange(380.0, 781.0)
 N_AT_0, N_AT_1 = 1.56, 1.50
 TEXELS = 128
-"""Across the map of these pages, and across their window of 2 by 2 units."""
+"""Across the map of these pages, of 2 by 2 units."""
+STILL = io.BytesIO()
+Image.new("RGB", (64, 48), "grey").save(STILL, "jpeg")
 
 
 def glass(slope: float = 0.0042) -> np.ndarray:
@@ -31,15 +35,17 @@ def page(things: dict[str, np.ndarray], lines: list[list[float]] | None = None) 
     """One lamp: `lines` [[nm, W]], else a continuum. `things`: arrays by their names (docs/pages.md)."""
     head: dict[str, Any] = {
         "mode": "index", "n_at_0": N_AT_0, "n_at_1": N_AT_1, "title": "A test", "description": "Few photons.",
-        "scene": "test", "receiver": "floor", "version": "0", "exposure_ev": -8.0, "compressed": False, "up": "y",
-        "window": {"u0": -1.0, "v0": -1.0, "u1": 1.0, "v1": 1.0, "texel": 4.0 / TEXELS}, "meshes": [],
+        "scene": "test", "receiver": "floor", "exposure_ev": -8.0, "up": "y", "steps": [], "notes": ["A note."],
+        "lit": {"centre": [0, 0], "across": 2.0}, "around": {"target": [0, 0, 0], "back": [0, 0.8, 0.6], "radius": 1.5},
+        "meshes": [],
         "plane": {"origin": [0, 0, 0], "u": [1, 0, 0], "v": [0, 0, -1], "outline": []}, "limits": {"gain_max": 2.0},
         "lights": [{"name": "lamp", "kind": "sun", "spectrum": 0}], "photons": {"unit": 1.0, "smoothing": 0.45},
         "spectra": [{"name": "own", "lines": lines or []}, {"name": "line", "lines": [[546.1, 9.0]], "choice": True}],
-        "glasses": [{"name": "own"}, {"name": "other"}],
+        "glasses": [{"name": "own", "V_d": 40.0}, {"name": "other", "V_d": 30.0}],
         "groups": [{"name": "own", "objects": ["ball"], "row": 0, "choices": [0, 1]}],
     }  # fmt: skip
     arrays = things | {
+        "still": np.frombuffer(STILL.getvalue(), "u1"),
         "observer": OBSERVER.astype("f4"), "spectra.density": np.stack([EVEN * (not lines), 0 * EVEN]).astype("f4"),
         "glass_n": np.stack([glass(), glass(0.006)]).astype("f4"), "nm": NM.astype("f4"),
         "variable": glass()[None].astype("f4"),
@@ -66,6 +72,18 @@ def photons(
         "photons.throughput": np.tile(carried, (3, 1)).astype("f2"), "photons.lattice": np.zeros(3, "u4"),
         "photons.edge": np.zeros(3, "u4"), "photons.fan": np.zeros((3, 2), "f2"),
     }  # fmt: skip
+
+
+def many_photons(count: int) -> dict[str, np.ndarray]:
+    """As a page holds them: here and there, some longer, some wider, of some part of the spectrum each."""
+    random = np.random.default_rng(1)
+    one = photons([1, 0], [0, 1], [1, 0], [1e-5] * 3, [0, 0.5, 1])
+    held = {name: np.repeat(values[:1], count, axis=0) for name, values in one.items()}
+    held["photons.position"] = random.normal(0.0, 0.25, (count, 2)).astype("f4")
+    held["photons.x"] = np.sort(random.integers(0, 65536, (count, 3)), axis=1).astype("u2")
+    for name in ("axis_s", "axis_t", "dposition_dn"):
+        held[f"photons.{name}"] = random.normal(0.0, 0.03, held[f"photons.{name}"].shape).astype("f2")
+    return held
 
 
 def light_by_place(gain: float, lines: list[list[float]] | None) -> tuple[np.ndarray, np.ndarray]:

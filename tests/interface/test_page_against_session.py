@@ -58,8 +58,8 @@ def errors(
     assert len(rows) == glasses
     others = {page.head["glasses"][row]["name"]: row for row in rows}
     own = page.head["groups"][0]["row"]
-    settings = [f"{{ gain: {gain}, glass: [0, {own}] }}" for gain in GAINS]
-    settings += [f"{{ gain: 1, glass: [0, {row}] }}" for row in others.values()]
+    settings = [f"{{ gain: {gain}, rows: spectrasplat.state.rows.with(0, {own}) }}" for gain in GAINS]
+    settings += [f"{{ gain: 1, rows: spectrasplat.state.rows.with(0, {row}) }}" for row in others.values()]
     changes = [with_gain(names, gain) for gain in GAINS] + [with_glass(names, name) for name in others]
     pictures, seen = page_pixels(browser, page, folder, settings)
     fewer, right = (session_pixels(scene, size, int(share * photons), changes) for share in (0.25, RIGHT))

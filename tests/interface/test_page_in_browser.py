@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 from interface.browser import CHROMIUM, Browser
 from interface.page_pixels import difference, gathered
-from interface.page_synthetic import TEXELS, beam, beam_map, photon_map, photons, written
+from interface.page_synthetic import TEXELS, beam, beam_map, many_photons, photon_map, photons, written
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is installed: apt-get install chromium")
 FEW = photons([0.12, 0.04], [-0.04, 0.08], [8.0, 3.0], [0.001, 0.001, 0.001], [0.0, 0.5, 1.0])
@@ -25,12 +25,12 @@ def browser() -> Iterator[Browser]:
         yield one
 
 
-def shown_map(browser: Browser) -> np.ndarray:
-    """Irradiance (rows, columns, 3) on the window, v upwards along rows, seen from above."""
+def shown_map(browser: Browser, thin: int = 1) -> np.ndarray:
+    """Irradiance (rows, columns, 3), v upwards along rows, seen from above, by one photon in `thin`."""
     browser.run("spectrasplat.frame()")
     step = 2.0 / TEXELS
     to_uv = np.array([[step, 0.0, -1.0], [0.0, -step, 1.0], [0.0, 0.0, 1.0]])
-    return gathered(browser, to_uv, TEXELS, TEXELS)[::-1]
+    return gathered(browser, to_uv, TEXELS, TEXELS, thin)[::-1]
 
 
 def test_it_opens_from_a_file_and_asks_for_nothing(browser: Browser, tmp_path: Path) -> None:
@@ -121,17 +121,44 @@ def test_a_phone_needs_no_scrolling_aside(browser: Browser, tmp_path: Path) -> N
     assert browser.run(unnamed) == []
 
 
-def test_without_webgl2_it_says_what_is_needed(browser: Browser, tmp_path: Path) -> None:
-    script = """{
-        const all = HTMLCanvasElement.prototype.getContext;
-        HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
-            return kind === 'webgl2' ? null : all.call(this, kind, ...more);
-        };
-    }"""
-    added = browser.call("Page.addScriptToEvaluateOnNewDocument", source=script)["identifier"]
-    browser.open(written(tmp_path, FEW | {"still": np.zeros(4, "u1")}))
-    browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=added)
-    assert "WebGL2" in browser.run(PROBLEM) and not browser.run("document.getElementById('still').hidden")
+IS_STILL = "!document.getElementById('still').hidden && document.querySelector('.panel').offsetHeight === 0"
+
+
+def test_without_webgl2_it_says_what_is_needed(tmp_path: Path) -> None:
+    with Browser("--disable-3d-apis") as bare:
+        bare.open(written(tmp_path, FEW))
+        assert "WebGL2" in bare.run(PROBLEM) and bare.run(IS_STILL)
+
+
+@pytest.mark.parametrize("cut", [lambda t: t[:-3000], lambda t: t.replace('id="blob">', 'id="blob">?', 1)])
+def test_a_damaged_page_shows_its_still(browser: Browser, tmp_path: Path, cut: Callable[[str], str]) -> None:
+    page = written(tmp_path, FEW)
+    page.write_text(cut(page.read_text("utf-8")), "utf-8")
+    browser.open(page)
+    assert "damaged or cut off" in browser.run(PROBLEM) and browser.run(IS_STILL)
+
+
+@pytest.mark.slow
+def test_the_still_is_shown_first_and_within_two_seconds(tmp_path: Path) -> None:
+    """Of 100,000 photons by software WebGL: milliseconds since a fresh browser was asked for the page, the least of
+    three; the live picture follows."""
+    page, times = written(tmp_path, many_photons(100_000)), []
+    shown = """new Promise((done) => new PerformanceObserver((list) => done(list.getEntries()[0].startTime))
+        .observe({ type: 'element', buffered: true }))"""
+    for _ in range(3):
+        with Browser() as fresh:
+            fresh.open(page, 1200, 900)
+            times.append((fresh.run(shown), fresh.run("spectrasplat.times.first")))
+    assert all(0.0 < still < live for still, live in times)
+    assert min(still for still, _ in times) < 2000.0, times
+
+
+def test_fewer_photons_show_as_much_light(browser: Browser, tmp_path: Path) -> None:
+    """While something moves: one photon in 16, wider and brighter."""
+    browser.open(written(tmp_path, many_photons(70_000)))
+    whole, thin = shown_map(browser), shown_map(browser, 16)
+    np.testing.assert_allclose(thin.sum(axis=(0, 1)), whole.sum(axis=(0, 1)), rtol=0.03)
+    assert 0.02 < difference(thin, whole) < 0.4
 
 
 def test_a_lost_context_is_told_and_comes_back(browser: Browser, tmp_path: Path) -> None:
@@ -139,8 +166,9 @@ def test_a_lost_context_is_told_and_comes_back(browser: Browser, tmp_path: Path)
     before = shown_map(browser)
     browser.run("window.lost = spectrasplat.light.gl.getExtension('WEBGL_lose_context'), lost.loseContext()")
     browser.wait(f"{PROBLEM}.includes('graphics card')")
+    assert browser.run(IS_STILL)
     browser.run("lost.restoreContext()")
-    browser.wait(f"spectrasplat.light && {PROBLEM} === ''")
+    browser.wait(f"spectrasplat.light && {PROBLEM} === '' && !({IS_STILL})")
     np.testing.assert_array_equal(shown_map(browser), before)
     assert browser.mistakes == []
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.commands.gallery import _entries
+from spectrasplat.commands.gallery import _MAKERS, _entries, _key
+from spectrasplat.commands.table import Gallery
 from spectrasplat.render.page.site import Card, write_documents, write_index
 
 
@@ -38,3 +39,15 @@ def test_names_are_those_of_scenes_and_lessons() -> None:
     assert all(step["set"] and step["text"] for entry in _entries([]) for step in entry.steps)
     with pytest.raises(UserError, match="did you mean 'prism'"):
         list(_entries(["prysm"]))
+
+
+def test_a_page_is_made_again_where_its_maker_is_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    maker = tmp_path / "page.py"
+    maker.write_text("1")
+    monkeypatch.setattr("spectrasplat.commands.gallery._MAKERS", (*_MAKERS, tmp_path))
+    (prism,), options = _entries(["prism"]), Gallery(scenes=("prism",), output=tmp_path, photons=100)
+    before = _key(prism, options)
+    assert _key(prism, options) == before
+    maker.write_text("2")
+    assert _key(prism, options) != before
+    assert all(any(folder.glob("page.*")) for folder in _MAKERS)

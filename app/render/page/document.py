@@ -1,8 +1,13 @@
-"""A page as one file: its data in an HTML page with all that shows them, which asks nothing of a network."""
+"""A page as one file: its data in an HTML page with all that shows them, which asks nothing of a network.
+
+Its words and its still stand before the scripts and the data, so that a browser shows them while it reads the rest, and
+where the rest is damaged or cannot be shown."""
 
 from __future__ import annotations
 
 import base64
+import html
+import itertools
 import json
 import re
 import zlib
@@ -35,19 +40,38 @@ def data_elements(arrays: Mapping[str, np.ndarray], head: Mapping[str, Any]) -> 
 
 
 def document(arrays: Mapping[str, np.ndarray], head: Mapping[str, Any]) -> str:
-    """The whole page."""
+    """The whole page. `arrays`: as docs/pages.md lists them, with `still`, a JPEG file."""
     folder = assets_dir() / "page"
 
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
-    modules = "\n".join(_EXPORT.sub("", _IMPORT.sub("", text(name))) for name in text("modules.txt").split())
-    parts = {"/*STYLE*/": text("page.css"), "/*SCRIPT*/": modules, "<!--DATA-->": data_elements(arrays, head)}
-    page = text("page.html").replace("<title></title>", f"<title>{_escaped(head['title'])}</title>")
-    for mark, content in parts.items():
-        page = page.replace(mark, content, 1)
-    return page
+    held = dict(arrays)
+    still = "data:image/jpeg;base64," + base64.b64encode(held.pop("still").tobytes()).decode()
+    title = html.escape(head["title"])
+    parts = {
+        "<!--TITLE-->": title,
+        "<!--DESCRIPTION-->": html.escape(head["description"]),
+        "<!--STILL-->": f'<img id="still" elementtiming="still" alt="{title}: a still picture" src="{still}">',
+        "<!--FIXED-->": "" if head["groups"] else " hidden",
+        "<!--GLASSES-->": "".join(map(_glass_row, head["groups"], itertools.repeat(head))),
+        "<!--GAIN-->": f"{head['limits']['gain_max']:g}",
+        "<!--SPECTRA-->": "".join(_option(i, s["name"]) for i, s in enumerate(head["spectra"]) if s.get("choice")),
+        "<!--NOTES-->": "".join(f"<p>{html.escape(note)}</p>\n" for note in head["notes"]),
+        "/*STYLE*/": text("page.css"),
+        "/*SCRIPT*/": "\n".join(_EXPORT.sub("", _IMPORT.sub("", text(name))) for name in text("modules.txt").split()),
+        "<!--DATA-->": data_elements(held, head),
+    }
+    return re.sub("|".join(map(re.escape, parts)), lambda found: parts[found[0]], text("page.html"))
 
 
-def _escaped(words: str) -> str:
-    return words.replace("&", "&amp;").replace("<", "&lt;")
+def _option(value: int, words: str) -> str:
+    return f'<option value="{value}">{html.escape(words)}</option>'
+
+
+def _glass_row(group: Mapping[str, Any], head: Mapping[str, Any]) -> str:
+    """A label with the glasses among which a reader chooses."""
+    glasses = ((row, head["glasses"][row]) for row in group["choices"])
+    options = "".join(_option(row, f"{glass['name']} (V {glass['V_d']:.1f})") for row, glass in glasses)
+    name = f"Glass of {', '.join(group['objects'])}" if len(head["groups"]) > 1 else "Glass"
+    return f'<label class="row"><span>{html.escape(name)}</span><select>{options}</select></label>'

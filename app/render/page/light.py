@@ -18,22 +18,19 @@ from ...gpu.records import EDGE_BIT, LATTICE_BIT
 from ...gpu.spectral_groups import samples_of
 from ...model.optics.colorimetry import VISIBLE_NM
 from ...passes.plane_frame import PlaneFrame, plane_frame
-from .picture import WINDOW_TEXELS
 
 if TYPE_CHECKING:
     from ..viewer.live_light import LiveLight
     from .spectra import Glasses
 
-_LIT = 0.998
-"""Share of the light that a page's window holds."""
+_LIT = 0.8
+"""Share along either axis of what views from above and all round begin with."""
 _MOST = 6e4
 """Of columns: what half floats hold. Longer ones are shortened; where one is no number, light falls on a point."""
 _FINER_BEAMS = 4.0
 """Times as many photons whose time beams may take where they carry all light."""
 _MOST_EDGES = 140_000
 """Of polygons: 8 MB on a page, about."""
-_MARGIN = 0.04
-"""Of the window's side, round it."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,7 @@ def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
     if not len(photons["x"]) and not len(beams["x"]):
         name = light.light_pass.scene.objects[item].name
         raise UserError(f"no caustic falls on '{name}': choose another receiver, or aim a light at glass near it")
-    head["window"] = _window(photons, beams, flux)
+    head["lit"] = _lit(photons, beams, flux)
     unit = float(photons["throughput"].max(initial=0.0)) or 1.0
     photons["throughput"] = (photons["throughput"] / unit).astype("f2")
     photons["x"] = np.rint(np.clip(photons["x"], 0.0, 1.0) * 65535.0).astype("u2")
@@ -174,8 +171,8 @@ def _beams(
     return found, polygons.flux
 
 
-def _window(photons: dict[str, np.ndarray], beams: dict[str, np.ndarray], flux: np.ndarray) -> dict[str, float]:
-    """The rectangle of the plane that holds nearly all of the light; `flux`: of each polygon."""
+def _lit(photons: dict[str, np.ndarray], beams: dict[str, np.ndarray], flux: np.ndarray) -> dict[str, Any]:
+    """`centre` of where most light falls, and how far it is `across`, somewhat more; `flux`: of each polygon."""
     places = [photons["position"].astype(float)]
     weights = [photons["throughput"][:, 1] * (photons["x"][:, 2] - photons["x"][:, 0])]
     if len(flux):
@@ -188,7 +185,5 @@ def _window(photons: dict[str, np.ndarray], beams: dict[str, np.ndarray], flux: 
         order = np.argsort(along)
         running = np.cumsum(weight[order])
         ends[:, k] = np.interp(running[-1] * np.array([0.5 - 0.5 * _LIT, 0.5 + 0.5 * _LIT]), running, along[order])
-    side = np.maximum(np.ptp(ends, axis=0), 1e-3 * float(np.ptp(ends, axis=0).max()) + 1e-9)
-    low, high = ends[0] - _MARGIN * side, ends[1] + _MARGIN * side
-    corners = zip(("u0", "v0", "u1", "v1"), (*low.tolist(), *high.tolist()), strict=True)
-    return dict(corners) | {"texel": float(side.max()) / WINDOW_TEXELS}
+    across = max(float(np.ptp(ends, axis=0).max()), 0.02 * float(np.ptp(place, axis=0).max()), 1e-9)
+    return {"centre": ends.mean(axis=0).tolist(), "across": 1.5 * across}

@@ -18,8 +18,6 @@ from ...passes.first_surfaces import FirstSurfaces
 from ...passes.plane_frame import PlaneFrame
 
 SUBPIXELS = 4
-WINDOW_TEXELS = 512
-"""Along the longer side of a page's window, about."""
 _GAMMA = 2.4
 _HEADROOM = 4.0
 """How many times display white the base may be."""
@@ -92,15 +90,13 @@ def weight_of(context: Context, buffers: SceneBuffers, camera: Camera, size: tup
     return weight / np.pi
 
 
-def seen_window(lit: dict[str, float], to_plane: np.ndarray, weight: np.ndarray) -> dict[str, float]:
-    """The part of the window `lit` that the camera sees, where it sees any: its map has the finer texels there."""
-    rows, columns = np.nonzero(weight.any(axis=2))
-    u, v, w = to_plane @ np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))])
-    if not len(rows):
-        return lit
-    low = np.maximum([(u / w).min(), (v / w).min()], [lit["u0"], lit["v0"]])
-    high = np.minimum([(u / w).max(), (v / w).max()], [lit["u1"], lit["v1"]])
-    if (high <= low).any():
-        return lit
-    ends = dict(zip(("u0", "v0", "u1", "v1"), (*low.tolist(), *high.tolist()), strict=True))
-    return ends | {"texel": float((high - low).max()) / WINDOW_TEXELS}
+def first_look(camera: Camera, frame: PlaneFrame, lit: dict[str, Any], buffers: SceneBuffers) -> dict[str, Any]:
+    """What a look all round begins with: the camera's own framing, `radius` to either side of a `target` in its middle,
+    as far away as the light."""
+    _, _, forward = camera_frame(camera)
+    position = np.asarray(camera.position, float)
+    light = buffers.space.to_world(frame.origin) + np.asarray(lit["centre"]) @ frame.axes
+    away = max(float(forward @ (light - position)), 0.5 * lit["across"])
+    flat = camera.kind == "orthographic"
+    radius = 0.5 * camera.vertical_extent if flat else away * np.tan(np.radians(0.5 * camera.vertical_fov_deg))
+    return {"target": (position + away * forward).tolist(), "back": (-forward).tolist(), "radius": float(radius)}
