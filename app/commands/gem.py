@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from .solving_table import Gem
 
 SUFFIXES = (".html", ".png", ".json")
-_ASC_INDEX = 1.54
-"""Of quartz, for which GemCad designs are made unless they say otherwise."""
 
 
 def gem(options: Gem) -> int:
@@ -69,22 +67,17 @@ def gem(options: Gem) -> int:
 
 def stone_at(path: Path, name: str | None, glass: str | None, up: str) -> Stone:
     """The stone in a file: of a scene its object `name`, or its first solid of glass. Raises `UserError`."""
-    from ..model.gem_scene import stone_from, stone_in
-    from ..model.gems.facet_design import read_asc
+    from ..model.gem_scene import stone_in
     from ..model.io.scene_file import load_scene
-    from ..model.scene import Dielectric, SceneObject
+    from ..model.staging import AS_FOUND, Staging
 
     notes: list[str] = []
     made_of = None if glass is None else glass_called(glass, path.parent, notes)
-    if path.suffix.lower() == ".asc" and name is None:
-        design = read_asc(path)
-        if made_of is None:
-            if design.n_d is None:
-                notes.append(f"{path.name} names no index; quartz's, {_ASC_INDEX}, was taken")
-            made_of = glass_called(str(design.n_d or _ASC_INDEX), path.parent, notes)
-        stone = stone_from(SceneObject(path.stem, design.mesh(), Dielectric(made_of)), made_of, up)
-    else:
-        stone = stone_in(load_scene(path), name, made_of, up)
+    is_design = path.suffix.lower() == ".asc"
+    scene = load_scene(path, Staging(glass=((None, "N-BK7"),)) if is_design and made_of is not None else AS_FOUND)
+    if is_design:  # of the stone, not of the lamp and the table that a scene got
+        notes += (sentence for sentence in scene.notes if sentence.startswith(path.name))
+    stone = stone_in(scene, name, made_of, up)
     return replace(stone, notes=(*stone.notes, *(sentence.rstrip(".") for sentence in notes)))
 
 
