@@ -26,8 +26,9 @@ if TYPE_CHECKING:
 def inspect(options: Inspect) -> int:
     """Show a scene, or its programs. Raises `UserError`."""
     from ..model.io.scene_file import load_scene
+    from ..model.panorama_lights import with_panorama_lights
 
-    scene = load_scene(find_scene(options.scene))
+    scene = with_panorama_lights(load_scene(find_scene(options.scene)))
     if options.programs:
         from .inspect_programs import programs_text
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..model.contacts import standing
-from ..model.panorama_lights import with_panorama_lights
 from ..model.scene import Camera, SceneObject
 from ..model.texture import Environment, Texture
 from . import facts as of_scenes
@@ -183,14 +182,7 @@ class PictureFeatures:
     environment_lights: bool = feature(
         "environment light",
         lambda facts: facts.no_environment_light is None,
-        why=lambda facts: (
-            "every diffuse surface is lit by it, with visibility, also through glass and over mirrors"
-            + (
-                "; what is small and bright in it is a light of its own"
-                if with_panorama_lights(facts.scene) is not facts.scene
-                else ""
-            )
-        ),
+        why=lambda _: "every diffuse surface is lit by it, with visibility, also through glass and over mirrors",
         why_not=lambda facts: facts.no_environment_light or "",
         names=("add_environment",),
         cost="up to six lookups a diffuse surface; a texture of some thousand texels a receiver",

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 from spectrasplat.commands.inspect_camera import Lookup, lookups
-from spectrasplat.commands.inspect_report import inspect_text, light_flux
+from spectrasplat.commands.inspect_report import inspect, inspect_text, light_flux
 from spectrasplat.commands.scenes import find_scene
+from spectrasplat.commands.table import Inspect
 from spectrasplat.features.features import Features
 from spectrasplat.features.receivers import picture_bytes
 from spectrasplat.features.row import size_words
@@ -201,3 +202,10 @@ def test_every_method_samples_the_spectrum_its_own_way(tmp_path: Path, method: s
     assert looked_up(value, method=method)["spectrum"].content == words
     plain = replace(value, objects=tuple(o for o in value.objects if not isinstance(o.material, Dielectric)))
     assert looked_up(plain, method=method)["spectrum"].content == "one interval"
+
+
+def test_lights_of_a_panorama_are_told_with_what_follows_from_them(capsys: pytest.CaptureFixture[str]) -> None:
+    assert inspect(Inspect(scene="prism_sill")) == 0
+    text = capsys.readouterr().out
+    assert "area rectangle" in row(text, "window of the panorama")
+    assert " in " in row(text, "lamp columns") and " in " in row(text, "beams")
