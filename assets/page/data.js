@@ -1,11 +1,10 @@
-// The page's data: a head in JSON, and arrays of numbers in one block of bytes (docs/page-format.md).
+// The page's data: a head in JSON, and arrays of numbers in one block of bytes (docs/pages.md).
 
-// Bytes of the block: base64, deflated where the head says so.
-async function bytesOf(text, compressed) {
+// Bytes of the block: deflated, base64.
+async function bytesOf(text) {
   const letters = atob(text.trim());
   const bytes = new Uint8Array(letters.length);
   for (let i = 0; i < letters.length; i++) bytes[i] = letters.charCodeAt(i);
-  if (!compressed) return bytes;
   const inflated = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
   return new Uint8Array(await new Response(inflated).arrayBuffer());
 }
@@ -26,7 +25,7 @@ const KINDS = { f4: Float32Array, f2: Uint16Array, u4: Uint32Array, i4: Int32Arr
 // `head`, and `array(name)`: its numbers, or null where there is none; 16 bits without a sign are shares of 1.
 export async function readData(page) {
   const head = JSON.parse(page.getElementById("head").textContent);
-  const bytes = await bytesOf(page.getElementById("blob").textContent, head.compressed);
+  const bytes = await bytesOf(page.getElementById("blob").textContent);
   let halves = null;
   const shapeOf = (name) => head.arrays[name]?.shape ?? [0];
   const raw = (name) => {

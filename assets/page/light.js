@@ -32,10 +32,10 @@ export class Light {
     this.edges = this.texture();
     this.base = this.texture(gl.LINEAR);
     this.weight = this.texture(gl.LINEAR);
-    this.map = this.target();
-    this.glass = this.target();
+    this.map = { texture: this.texture(), framebuffer: gl.createFramebuffer() };
+    this.glass = { texture: this.texture(), framebuffer: gl.createFramebuffer() };
     this.whole = gl.createVertexArray();
-    this.counts = { draws: 0, bytes: 0 };
+    this.draws = 0;
     this.things = [[this.splats, photons, PHOTON], [this.beams, beams, BEAM]].filter(([, { count }]) => count).map(([kind, { rows, count }, floats]) => {
       const records = this.texture();
       this.fill(records, (ABREAST * floats) / 4, Math.ceil(count / ABREAST), rows);
@@ -75,7 +75,6 @@ export class Light {
     const { gl } = this;
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, width, height, 0, gl.RGBA, gl.FLOAT, values);
-    this.counts.bytes += values.byteLength;
   }
 
   picture(texture, bitmap) {
@@ -83,21 +82,6 @@ export class Light {
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.pixelStorei(gl.UNPACK_COLORSPACE_CONVERSION_WEBGL, gl.NONE);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, bitmap);
-  }
-
-  target() {
-    const { gl } = this, texture = this.texture(), framebuffer = gl.createFramebuffer();
-    return { texture, framebuffer, width: 0, height: 0 };
-  }
-
-  resize(target, width, height, format) {
-    const { gl } = this;
-    if (target.width === width && target.height === height) return;
-    Object.assign(target, { width, height });
-    gl.bindTexture(gl.TEXTURE_2D, target.texture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, format.internal, width, height, 0, gl.RGBA, format.type, null);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
   }
 
   // Two triangles each, of four corners; instances of so few are slow on many a device. Every sixteenth comes first,
@@ -152,6 +136,23 @@ export class Light {
     gl.uniformMatrix3fv(at("to_texel"), true, this.toTexel);
   }
 
+  // Empty a target of so many pixels for draws that add to it.
+  begin(target, width, height, internal, type, kept) {
+    const { gl } = this;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
+    if (target.width !== width || target.height !== height) {
+      Object.assign(target, { width, height });
+      gl.bindTexture(gl.TEXTURE_2D, target.texture);
+      gl.texImage2D(gl.TEXTURE_2D, 0, internal, width, height, 0, gl.RGBA, type, null);
+      gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, target.texture, 0);
+    }
+    gl.viewport(0, 0, width, height);
+    gl.blendColor(1, 1, 1, 1);
+    gl.clear(gl.COLOR_BUFFER_BIT);
+    gl.enable(gl.BLEND);
+    gl.blendFunc(gl.CONSTANT_COLOR, kept);
+  }
+
   // Add up all light as it is seen by `toUv` (views.js) on so many pixels, or every `step`-th of them; `thin`: by one
   // photon in 1, 4 or 16, as much wider and brighter.
   gather(toUv, width, height, step = 1, thin = 1) {
@@ -162,14 +163,8 @@ export class Light {
     const [kx, ky] = [width / this.size[0], height / this.size[1]];
     this.toUv = [0, 3, 6].flatMap((r) => [kx * toUv[r], -ky * toUv[r + 1], toUv[r + 2] + height * toUv[r + 1]]);
     this.toTexel = inverse(this.toUv);
-    const format = this.isFull ? gl.RGBA32F : gl.RGBA16F;
-    this.resize(this.map, 1.5 * this.size[0], this.size[1], { internal: format, type: this.isFull ? gl.FLOAT : gl.HALF_FLOAT });
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.map.framebuffer);
-    gl.viewport(0, 0, this.map.width, this.map.height);
-    gl.clearColor(0, 0, 0, 0);
-    gl.clear(gl.COLOR_BUFFER_BIT);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.CONSTANT_COLOR, gl.ONE);
+    const [format, type] = this.isFull ? [gl.RGBA32F, gl.FLOAT] : [gl.RGBA16F, gl.HALF_FLOAT];
+    this.begin(this.map, 1.5 * this.size[0], this.size[1], format, type, gl.ONE);
     for (const { kind, records, count, quads } of this.things) {
       const share = [thin, thin / 4].find((k) => kind === this.splats && k > 1 && count > FEWEST * k) ?? 1;
       const drawn = Math.ceil(count / share), each = count / drawn;
@@ -180,28 +175,20 @@ export class Light {
       gl.uniform1i(kind.at("lines"), this.tables.lineCount);
       if (kind === this.splats) gl.uniform1f(kind.at("smoothing"), head.photons.smoothing * Math.sqrt(each));
       gl.drawElements(gl.TRIANGLES, 6 * drawn, gl.UNSIGNED_INT, 0);
-      this.counts.draws++;
+      this.draws++;
     }
-    gl.disable(gl.BLEND);
   }
 
   // The glass as `camera` (views.js) sees it, kept until it moves.
   drawGlass(camera, width, height) {
     const { gl } = this;
-    this.resize(this.glass, width, height, { internal: gl.RGBA8, type: gl.UNSIGNED_BYTE });
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.glass.framebuffer);
-    gl.viewport(0, 0, width, height);
-    gl.clearColor(0, 0, 0, 0);
-    gl.clear(gl.COLOR_BUFFER_BIT);
-    gl.enable(gl.BLEND);
-    gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+    this.begin(this.glass, width, height, gl.RGBA8, gl.UNSIGNED_BYTE, gl.ONE_MINUS_SRC_ALPHA);
     gl.useProgram(this.solid.program);
     gl.uniformMatrix4fv(this.solid.at("to_clip"), true, camera.toClip);
     gl.uniform3f(this.solid.at("eye"), ...camera.eye);
     gl.bindVertexArray(this.meshes.vertices);
     gl.drawArrays(gl.TRIANGLES, 0, this.meshes.count);
-    this.counts.draws++;
-    gl.disable(gl.BLEND);
+    this.draws++;
   }
 
   // The picture, into the canvas. `mode`: 0 camera, 1 from above, 2 in space.
@@ -209,6 +196,7 @@ export class Light {
     const { gl, head } = this;
     gl.bindFramebuffer(gl.FRAMEBUFFER, null);
     gl.viewport(0, 0, width, height);
+    gl.disable(gl.BLEND);
     this.use(this.view, { map: this.map.texture, base: this.base, weight: this.weight, glass: this.glass.texture });
     gl.uniform2f(this.view.at("pixels"), width, height);
     gl.uniform1i(this.view.at("view"), mode);
@@ -217,14 +205,6 @@ export class Light {
     gl.uniform4f(this.view.at("mark"), ...(mark ?? [0, 0]), mark ? 1 : 0, Math.max(4, width / 90));
     gl.bindVertexArray(this.whole);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
-    this.counts.draws++;
-  }
-
-  // Light on the texels of all levels (linear Rec.709 and 0), rows from below: for tests.
-  readMap() {
-    const { gl } = this, [width, height] = this.size, all = new Float32Array(4 * this.map.width * height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.map.framebuffer);
-    gl.readPixels(0, 0, this.map.width, height, gl.RGBA, gl.FLOAT, all);
-    return { width, height, stride: this.map.width, values: all };
+    this.draws++;
   }
 }

@@ -6,8 +6,8 @@ import { bindPanel, bindReading, byId, tell, tellIndex } from "./panel.js";
 import { coloursOf, drawIndex, drawSpectrum, nmUnder } from "./plots.js";
 import { lampSpectrum, spectrumAt } from "./probe.js";
 import { beamRows, photonRows } from "./records.js";
-import { asBright, COUNT, indexOf, indexTable, lightTable, placesOf, single } from "./spectra.js";
-import { areaAt, around, fromAbove, fromCamera, inverse, startAround, uvAt } from "./views.js";
+import { COUNT, indexOf, indexTable, lightTable, placesOf, scaled, single } from "./spectra.js";
+import { areaAt, around, fromAbove, fromCamera, inverse, uvAt } from "./views.js";
 
 const SLOW_MS = 100, FAST_MS = 25, SETTLED_MS = 180, WIDEST = 4, COARSEST = 16;
 const LIGHT = ["rows", "gain", "spectrum", "nm", "isSingle"], SEEN = ["space", "view", "above"];
@@ -30,19 +30,20 @@ async function start() {
   // The still is a picture already: it is on the screen before anything else is read.
   await byId("still").decode().catch(() => {});
   await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
-  const times = { still: performance.now(), first: 0, frame: 0 };
+  const times = { first: 0, frame: 0 };
   const { head, array, shapeOf, picture } = await readData(document).catch(() => {
     throw new Error("the data of this file are damaged or cut off; copy or export it again.");
   });
-  const glassN = array("glass_n"), observer = array("observer"), density = array("spectra.density");
+  const glassN = array("glass_n"), density = array("spectra.density");
   const part = (values, row) => values.subarray(COUNT * row, COUNT * (row + 1)), glass = (row) => part(glassN, row);
+  const [observer, response] = ["observer", "response"].map((name) => [0, 1, 2].map((c) => part(array(name), c)));
   const spectra = head.spectra.map(({ lines }, i) => ({ density: part(density, i), lines }));
-  const nmOf = array("nm"), variable = array("variable"), reflectance = array("reflectance");
+  const nmOf = array("nm"), variable = array("variable");
   const colours = coloursOf(observer), shapeOfPicture = head.camera ? head.camera.height / head.camera.width : 0.75;
   const records = { photons: photonRows(head, array, shapeOf), beams: beamRows(array) };
   const fresh = () => ({
     gain: 1, rows: head.groups.map(({ row }) => row), spectrum: -1, isSingle: false, nm: 550, exposure: 0, readNm: 588,
-    view: head.camera ? "camera" : "above", above: head.lit, space: startAround(head), mark: null, playing: null,
+    view: head.camera ? "camera" : "above", above: head.lit, space: head.around, mark: null, playing: null,
   });
   const state = fresh(), canvas = byId("picture"), shown = { index: [], rows: [], x: null, paths: null };
   const dirty = { tables: true, map: true, glass: true, spectrum: true };
@@ -59,11 +60,11 @@ async function start() {
     shown.x = places.x;
     shown.rows = head.lights.map((lamp) => {
       const own = spectra[lamp.spectrum];
-      const chosen = state.spectrum < 0 ? own : asBright(spectra[state.spectrum], own, observer);
+      const chosen = state.spectrum < 0 ? own : scaled(spectra[state.spectrum], lamp.luminous);
       return state.isSingle ? single(state.nm, chosen) : chosen;
     });
     shown.paths = indexTable(head, shown.index, variable, nmOf);
-    light.setTables(lightTable(shown.rows, shown.x, observer, reflectance), shown.paths);
+    light.setTables(lightTable(shown.rows, shown.x, response), shown.paths);
     problem(places.isWithin ? "" : "The ends of the spectrum are left out: this glass goes beyond the traced indices.");
   }
 
@@ -81,7 +82,7 @@ async function start() {
     const begun = performance.now();
     queued = false;
     if (!light) return;
-    light.counts.draws = light.counts.bytes = 0;
+    light.draws = 0;
     play(now);
     fit();
     if (dirty.tables) tables();
@@ -198,7 +199,7 @@ async function start() {
     const nearer = (factor) => {
       const { view, above, space } = state;
       if (view === "above") set({ above: { ...above, across: above.across * factor } });
-      if (view === "space") set({ space: { ...space, distance: space.distance * factor } });
+      if (view === "space") set({ space: { ...space, radius: space.radius * factor } });
     };
     const drag = (dx, dy) => {
       const scale = Math.min(canvas.clientWidth, canvas.clientHeight), { view, above, space } = state;

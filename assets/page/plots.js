@@ -4,9 +4,9 @@ import { COUNT, FIRST_NM, LAST_NM, valueAt } from "./spectra.js";
 
 // Colour of a wavelength on a screen, by the observer's own table (linear Rec.709 up to a factor).
 export function coloursOf(observer) {
-  const most = observer.reduce((a, b) => Math.max(a, b));
+  const most = Math.max(...observer.flatMap((values) => [...values]));
   return Array.from({ length: COUNT }, (_, i) => {
-    const rgb = [0, 1, 2].map((c) => observer[3 * i + c] / most), white = Math.max(-Math.min(...rgb), 0);
+    const rgb = observer.map((values) => values[i] / most), white = Math.max(-Math.min(...rgb), 0);
     const top = Math.max(...rgb) + white, bright = Math.min(Math.max(1.6 * top, 0.08), 1);
     const shown = rgb.map((c) => (((c + white) / (top || 1)) * bright) ** (1 / 2.2));
     return `rgb(${shown.map((c) => Math.round(255 * c)).join(" ")})`;

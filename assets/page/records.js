@@ -5,22 +5,18 @@ const table = (count, floats) => new Float32Array(floats * ABREAST * Math.ceil(c
 
 // Place, change with the third index; sides; change with two indices; x and row; throughput, 0; points of its
 // lattice, edge of its light, by how much it widens along its sides.
+const PLACES = { position: 0, axis_s: 4, axis_t: 6, dposition_dn: 8, x: 12, light: 15, throughput: 16, lattice: 20, edge: 21, fan: 22 };
+
 export function photonRows(head, array, shapeOf) {
   const count = shapeOf("photons.position")[0], rows = table(count, PHOTON);
-  if (!count) return { rows, count };
-  const [position, s, t, change, x, throughput, light, lattice, edge, fan] =
-    ["position", "axis_s", "axis_t", "dposition_dn", "x", "throughput", "light", "lattice", "edge", "fan"].map((name) => array(`photons.${name}`));
-  const groups = change.length / (2 * count), unit = head.photons.unit ?? 1;
-  for (let i = 0; i < count; i++) {
-    const at = PHOTON * i;
-    rows.set([position[2 * i], position[2 * i + 1]], at);
-    rows.set([s[2 * i], s[2 * i + 1], t[2 * i], t[2 * i + 1]], at + 4);
-    for (let g = 0; g < Math.min(groups, 3); g++)
-      rows.set([change[2 * (groups * i + g)], change[2 * (groups * i + g) + 1]], g === 2 ? at + 2 : at + 8 + 2 * g);
-    rows.set([x[3 * i], x[3 * i + 1], x[3 * i + 2], light?.[i] ?? 0], at + 12);
-    for (let k = 0; k < 3; k++) rows[at + 16 + k] = throughput[3 * i + k] * unit;
-    rows.set([lattice[i], edge[i], fan[2 * i], fan[2 * i + 1]], at + 20);
-  }
+  const put = (name, at, first) => {
+    const values = array(`photons.${name}`), width = values ? values.length / count : 0;
+    const unit = name === "throughput" ? head.photons.unit : 1;
+    for (let i = 0; i < count; i++)
+      for (let k = first; k < Math.min(width, first + 4); k++) rows[PHOTON * i + at + k - first] = values[width * i + k] * unit;
+  };
+  for (const [name, at] of Object.entries(PLACES)) put(name, at, 0);
+  put("dposition_dn", 2, 4);
   return { rows, count };
 }
 
@@ -53,23 +49,19 @@ export function beamRows(array) {
   return { rows, count, most, edges };
 }
 
-// The rectangle of least area along a side of a convex polygon, corners `from` to `to`.
+// The rectangle about a convex polygon, corners `from` to `to`, along its longest side.
 function rectangle(hull, from, to) {
-  let best = null, least = Infinity;
-  for (let i = from; i < to; i++) {
-    const j = i + 1 < to ? i + 1 : from, dx = hull[2 * j] - hull[2 * i], dy = hull[2 * j + 1] - hull[2 * i + 1], length = Math.hypot(dx, dy);
-    if (length < 1e-12 && best) continue;
-    const [ex, ey] = length < 1e-12 ? [1, 0] : [dx / length, dy / length], low = [Infinity, Infinity], high = [-Infinity, -Infinity];
-    for (let k = from; k < to; k++)
-      [hull[2 * k] * ex + hull[2 * k + 1] * ey, hull[2 * k + 1] * ex - hull[2 * k] * ey].forEach((place, axis) => {
-        low[axis] = Math.min(low[axis], place);
-        high[axis] = Math.max(high[axis], place);
-      });
-    const half = [0, 1].map((axis) => (high[axis] - low[axis]) / 2), [p, q] = [0, 1].map((axis) => (high[axis] + low[axis]) / 2);
-    const area = (half[0] + 1e-6 * half[1]) * (half[1] + 1e-6 * half[0]);
-    if (area >= least) continue;
-    least = area;
-    best = { middle: [p * ex - q * ey, p * ey + q * ex], along: [ex, ey], half };
+  let longest = 1e-12, along = [1, 0];
+  for (let i = from, j = to - 1; i < to; j = i++) {
+    const side = [hull[2 * i] - hull[2 * j], hull[2 * i + 1] - hull[2 * j + 1]], length = Math.hypot(...side);
+    if (length > longest) [longest, along] = [length, side.map((part) => part / length)];
   }
-  return best;
+  const [ex, ey] = along, low = [Infinity, Infinity], high = [-Infinity, -Infinity];
+  for (let k = from; k < to; k++)
+    [hull[2 * k] * ex + hull[2 * k + 1] * ey, hull[2 * k + 1] * ex - hull[2 * k] * ey].forEach((place, axis) => {
+      low[axis] = Math.min(low[axis], place);
+      high[axis] = Math.max(high[axis], place);
+    });
+  const half = [0, 1].map((axis) => (high[axis] - low[axis]) / 2), [p, q] = [0, 1].map((axis) => (high[axis] + low[axis]) / 2);
+  return { middle: [p * ex - q * ey, p * ey + q * ex], along, half };
 }

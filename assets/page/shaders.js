@@ -60,22 +60,6 @@ float below_normal(float z) { return 0.5 + 0.5 * error_function(clamp(z, -8.0, 8
 float excess(float z) { return normal(z) - z * (1.0 - below_normal(z)); }
 `;
 
-const SWEPT = `
-// Where in the band, 0 to 1, what lands a share of the way along the sweep is.
-float in_band(float way) {
-  if (!BENT || abs(weights.w) < 1e-3) return way;
-  float c = weights.w, b = 1.0 + c, root = b * b - 4.0 * c * clamp(way, 0.0, 1.0);
-  return (b - sqrt(max(root, 0.0))) / (2.0 * c);
-}
-float way_to(float x) {
-  float f = (x - band.x) / (band.z - band.x);
-  return BENT ? f + weights.w * f * (1.0 - f) : f;
-}
-float carried_at(float x) {
-  return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0);
-}
-`;
-
 export const SPLAT_VERTEX = COMMON + TABLES + RECORDS(6) + GAUSSIAN + `
 uniform float smoothing;
 vec4 place_v2;  // where the anchor lands; change with the third index
@@ -83,23 +67,20 @@ vec4 v01;       // change with the first and the second index
 vec4 span;      // x: from, anchor, to; row of the light's table
 flat out vec4 band;       // x: from, anchor, to; standard deviation
 flat out vec4 weights;    // throughput at the anchor, its slopes below and above; bend of the sweep
-flat out vec4 shape;      // half a texel across; 1 if the sweep is short; 1 / standard deviation along; row
+flat out vec3 shape;      // half a texel across; 1 / standard deviation along; row
 flat out vec3 ripple;
-flat out vec3 moments[4]; // of a short sweep's light about its middle, in standard deviations, each over its factorial
 flat out vec4 rect;
 out vec4 at;              // across, along (0 to 1), cycles
 out float lit;            // how far inside of the light's edge, 0 to 1 over its blur
-` + SWEPT + `
 const float TEXEL = 1.0 / 12.0, NARROWED = 0.4 / 0.45;
-vec2 shift_to(float x) {
+vec4 indices_at(int row, float x) {
   float place = clamp(x, 0.0, 1.0) * float(SAMPLES - 1);
   int i = min(int(place), SAMPLES - 2);
-  vec4 below = texelFetch(paths, ivec2(i, 0), 0);
-  vec4 n = below + (place - float(i)) * (texelFetch(paths, ivec2(i + 1, 0), 0) - below);
-  place = clamp(span.y, 0.0, 1.0) * float(SAMPLES - 1);
-  i = min(int(place), SAMPLES - 2);
-  below = texelFetch(paths, ivec2(i, 1), 0);
-  n -= below + (place - float(i)) * (texelFetch(paths, ivec2(i + 1, 1), 0) - below);
+  vec4 below = texelFetch(paths, ivec2(i, row), 0);
+  return below + (place - float(i)) * (texelFetch(paths, ivec2(i + 1, row), 0) - below);
+}
+vec2 shift_to(float x) {
+  vec4 n = indices_at(0, x) - indices_at(1, span.y);
   return n.x * v01.xy + n.y * v01.zw + n.z * place_v2.zw;
 }
 // Point of the emission lattice, in steps of which three are the shortest (shaders/lib/lattice.glsl there): its two
@@ -126,12 +107,6 @@ float damping(vec2 k, float swept) {
 }
 float kept(float edge, float wide, float s) {
   return 1.0 - 2.0 * s / wide * (excess((edge - 0.5 * wide) / s) - excess((edge + 0.5 * wide) / s));
-}
-void add_moments(vec3 light, float at, float variance) {
-  moments[0] += light;
-  moments[1] += at * light;
-  moments[2] += 0.5 * (at * at + variance) * light;
-  moments[3] += at * (at * at + 3.0 * variance) / 6.0 * light;
 }
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
@@ -263,25 +238,7 @@ void main() {
   weights = amplitude * vec4(carried.y, (carried.y - carried.x) / max(span.y - span.x, 1e-6),
     (carried.z - carried.y) / max(span.z - span.y, 1e-6), 0.0);
   weights.w = bend;
-  shape = vec4(0.5 * box * SQRT_HALF / root, sweep < 1.2 * sigma, 1.0 / sigma, span.w);
-  for (int i = 0; i < 4; ++i) moments[i] = vec3(0.0);
-  if (shape.y > 0.0) {
-    const int PARTS = 4;
-    int row = int(span.w);
-    float unit = sweep / sigma, wide = unit / float(PARTS), x_from = x_lo;
-    vec3 before = energy_below(row, x_lo);
-    for (int i = 0; i < PARTS; ++i) {
-      float x = mix(x_lo, x_hi, in_band(float(i + 1) / float(PARTS)));
-      vec3 now = energy_below(row, x);
-      add_moments((now - before) * carried_at(0.5 * (x_from + x)), (float(i) + 0.5) * wide - 0.5 * unit, wide * wide / 12.0);
-      before = now;
-      x_from = x;
-    }
-    for (int k = 0; k < lines; ++k) {
-      vec4 line = line_of(row, k);
-      if (line.w >= x_lo && line.w < x_hi) add_moments(line.rgb * carried_at(line.w), unit * (way_to(line.w) - 0.5), 0.0);
-    }
-  }
+  shape = vec3(0.5 * box * SQRT_HALF / root, 1.0 / sigma, span.w);
   rect = rect_of(level);
   vec2 beside = corner.x * long_side + corner.y * short_side;
   float w = 1.0 + dot(widening, corner);
@@ -289,26 +246,32 @@ void main() {
 }`;
 
 export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + `
-flat in vec4 band, weights, shape, rect;
-flat in vec3 ripple, moments[4];
+flat in vec4 band, weights, rect;
+flat in vec3 shape, ripple;
 in vec4 at;
 in float lit;
 out vec4 deposited;
-` + SWEPT + `void main() {
+// Where in the band, 0 to 1, what lands a share of the way along the sweep is.
+float in_band(float way) {
+  if (!BENT || abs(weights.w) < 1e-3) return way;
+  float c = weights.w, b = 1.0 + c, root = b * b - 4.0 * c * clamp(way, 0.0, 1.0);
+  return (b - sqrt(max(root, 0.0))) / (2.0 * c);
+}
+float way_to(float x) {
+  float f = (x - band.x) / (band.z - band.x);
+  return BENT ? f + weights.w * f * (1.0 - f) : f;
+}
+float carried_at(float x) {
+  return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0);
+}
+void main() {
   if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
   float w = 1.0 / gl_FragCoord.w;
   float share = w * w * 0.5 * (error_function(min(at.x + w * shape.x, 6.0)) - error_function(max(at.x - w * shape.x, -6.0)));
   share *= clamp(lit, 0.0, 1.0);
   vec3 away = abs(fract(vec3(at.zw, at.z + at.w)) * 2.0 - 1.0);
   share *= 1.0 - dot(ripple, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);
-  float z = (at.y - 0.5) / band.w;
-  if (shape.y > 0.0) {
-    // By Hermite's polynomials.
-    vec3 sum = moments[0] + z * moments[1] + (z * z - 1.0) * moments[2] + z * (z * z - 3.0) * moments[3];
-    deposited = vec4(share * shape.z * normal(z) * sum, 0.0);
-    return;
-  }
-  int row = int(shape.w);
+  int row = int(shape.z);
   // What lands within three standard deviations, in parts: their light times a normal density at their middles, less
   // wide by what a part's own width adds.
   float s = band.w, from = clamp(at.y - 3.0 * s, 0.0, 1.0), to = clamp(at.y + 3.0 * s, 0.0, 1.0);
@@ -323,11 +286,11 @@ out vec4 deposited;
     before = now;
     x_from = x;
   }
-  sum *= shape.z * s / own;
+  sum *= shape.y * s / own;
   for (int k = 0; k < lines; ++k) {
     vec4 line = line_of(row, k);
     if (line.w < band.x || line.w >= band.z) continue;
-    sum += line.rgb * normal((way_to(line.w) - at.y) / s) * shape.z * carried_at(line.w);
+    sum += line.rgb * normal((way_to(line.w) - at.y) / s) * shape.y * carried_at(line.w);
   }
   deposited = vec4(share * sum, 0.0);
 }`;
@@ -410,13 +373,6 @@ float covered(float t) {
     if (own.z < reach) lines[count++] = own;
   }
   if (count == 0) return 1.0;
-  if (count == 1) {
-    vec3 line = lines[0];
-    vec2 n = abs(line.xy);
-    float sum = 0.5 * (n.x + n.y), difference = 0.5 * abs(n.x - n.y), h = abs(line.z), missing = max(sum - h, 0.0);
-    float share = h <= difference ? 0.5 + h / max(n.x, n.y) : 1.0 - missing * missing / max(2.0 * n.x * n.y, 1e-12);
-    return line.z >= 0.0 ? share : 1.0 - share;
-  }
   float twice = 0.0;
   vec4 low = vec4(-0.5), high = vec4(0.5);
   for (int i = 0; i < count; ++i) {

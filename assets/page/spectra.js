@@ -32,19 +32,9 @@ export function placesOf(head, index, nm) {
   return { x: free.map((x) => Math.min(Math.max(x, 0), 1)), isWithin: free.every((x) => x > -1e-4 && x < 1 + 1e-4) };
 }
 
-// Luminous flux of a spectrum, up to a factor: { density (401,), lines [[nm, W]] }.
-export function luminous({ density, lines }, observer) {
-  const y = (i) => observer[3 * i] * 0.212639 + observer[3 * i + 1] * 0.7151687 + observer[3 * i + 2] * 0.0721923;
-  let sum = 0;
-  for (let i = 0; i < COUNT; i++) sum += density[i] * y(i) * (i % (COUNT - 1) ? 1 : 0.5);
-  for (const [nm, watts] of lines) sum += watts * y(Math.round(nm) - FIRST_NM);
-  return sum;
-}
-
-// One spectrum with the luminous flux of another.
-export function asBright(spectrum, other, observer) {
-  const scale = luminous(other, observer) / luminous(spectrum, observer);
-  return { density: spectrum.density.map((w) => w * scale), lines: spectrum.lines.map(([nm, w]) => [nm, w * scale]) };
+// A spectrum, { density (401,), lines [[nm, W]] }, of another power.
+export function scaled({ density, lines }, scale) {
+  return { density: density.map((w) => w * scale), lines: lines.map(([nm, w]) => [nm, w * scale]) };
 }
 
 // A single wavelength in place of a spectrum: what 10 nm of an even one as bright would have there.
@@ -55,26 +45,19 @@ export function single(nm, spectrum) {
 }
 
 // Rows of the shaders' table: (red, green, blue, 0) below each place between the ends of the light, then its lines
-// (red, green, blue, x). A row a spectrum; `reflectance` (401,) or null.
-export function lightTable(rows, x, observer, reflectance) {
-  let low = 1, high = 0;
-  const reach = (from, to) => {
-    low = Math.min(low, from);
-    high = Math.max(high, to);
-  };
-  for (const spectrum of rows) {
-    for (let i = 0; i < COUNT; i++) if (spectrum.density[i] > 0) reach(x[Math.max(i - 1, 0)], x[Math.min(i + 1, COUNT - 1)]);
-    for (const [nm] of spectrum.lines) reach(valueAt(x, nm) - 2e-4, valueAt(x, nm) + 2e-4);
-  }
+// (red, green, blue, x). A row a spectrum; `response`: what each colour gets of a watt, by nanometre.
+export function lightTable(rows, x, response) {
+  const ends = rows.flatMap(({ density, lines }) => [
+    ...x.filter((_, i) => [i - 1, i, i + 1].some((k) => density[k] > 0)),
+    ...lines.flatMap(([nm]) => [valueAt(x, nm) - 2e-4, valueAt(x, nm) + 2e-4]),
+  ]);
+  const low = Math.min(1, ...ends), high = Math.max(0, ...ends);
   const middle = (low + high) / 2, half = Math.max((high - low) / 2, 2e-4);
   const support = [middle - half, middle + half];
   const width = SAMPLES + MOST_LINES, table = new Float32Array(4 * width * rows.length);
   let lineCount = 0;
   rows.forEach((spectrum, r) => {
-    const energy = (i, watts) => {
-      const share = watts * (reflectance ? valueAt(reflectance, i + FIRST_NM) : 1);
-      return [0, 1, 2].map((c) => share * valueOf(observer, i, c));
-    };
+    const energy = (nm, watts) => response.map((colour) => watts * valueAt(colour, nm));
     const base = 4 * width * r;
     // Cells of a nanometre, half ones at the ends; even within.
     const below = [0, 0, 0], step = (support[1] - support[0]) / (SAMPLES - 1);
@@ -86,24 +69,18 @@ export function lightTable(rows, x, observer, reflectance) {
     for (let i = 0; i < COUNT; i++) {
       const from = valueAt(x, FIRST_NM + Math.max(i - 0.5, 0)), to = valueAt(x, FIRST_NM + Math.min(i + 0.5, COUNT - 1));
       if (to <= 0 || from >= 1) continue; // beyond what was traced
-      const cell = energy(i, spectrum.density[i] * (i % (COUNT - 1) ? 1 : 0.5));
+      const cell = energy(FIRST_NM + i, spectrum.density[i] * (i % (COUNT - 1) ? 1 : 0.5));
       while (sample < SAMPLES && support[0] + sample * step < to)
         put(Math.max(support[0] + sample * step - from, 0) / Math.max(to - from, 1e-12), cell);
       for (let c = 0; c < 3; c++) below[c] += cell[c];
     }
     while (sample < SAMPLES) put(0, below);
     spectrum.lines.slice(0, MOST_LINES).forEach(([nm, watts], k) => {
-      table.set([...energy(nm - FIRST_NM, watts), valueAt(x, nm)], base + 4 * (SAMPLES + k));
+      table.set([...energy(nm, watts), valueAt(x, nm)], base + 4 * (SAMPLES + k));
       lineCount = Math.max(lineCount, k + 1);
     });
   });
   return { table, width, height: rows.length, support, lineCount };
-}
-
-// One channel of the observer (401, 3) at a place between its rows.
-function valueOf(observer, i, channel) {
-  const k = Math.min(Math.max(Math.floor(i), 0), COUNT - 2), share = i - k;
-  return observer[3 * k + channel] * (1 - share) + observer[3 * (k + 1) + channel] * share;
 }
 
 // Two rows of the paths' table over x: each group's variable (its glass's index) as shown, and as traced; three groups

@@ -7,10 +7,7 @@ const mul = (a, k) => a.map((x) => k * x);
 const plus = (a, b, k) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const unit = (a) => mul(a, 1 / (Math.hypot(...a) || 1));
-const upOf = ({ up }) => (up === "y" ? [0, 1, 0] : [0, 0, 1]);
 const HALF_ANGLE = 0.35;  // of the view all round, over the canvas' smaller side
-// Two axes of the horizon.
-const levelOf = (up) => (up[1] ? [[0, 0, 1], [1, 0, 0]] : [[0, 1, 0], [-1, 0, 0]]);
 
 export const uvAt = (m, px, py) => {
   const [u, v, w] = [0, 3, 6].map((row) => m[row] * px + m[row + 1] * py + m[row + 2]);
@@ -39,9 +36,10 @@ export function fromAbove({ centre, across }, width, height) {
   return [k, 0, centre[0] - (k * width) / 2, 0, -k, centre[1] + (k * height) / 2, 0, 0, 1];
 }
 
-// About a place: angles round the up axis and above the horizon, distance. Also what the glass is drawn with.
-export function around(head, { target, turn, lift, distance }, width, height) {
-  const { plane } = head, up = upOf(head), [side, ahead] = levelOf(up), { cos, sin } = Math;
+// About a place, to `radius` on either side: angles round the up axis and above the horizon; `axes`: two of the horizon,
+// up. Also what the glass is drawn with.
+export function around({ plane }, { target, axes: [side, ahead, up], turn, lift, radius }, width, height) {
+  const { cos, sin } = Math, distance = radius / Math.tan(HALF_ANGLE);
   const back = plus(mul(plus(mul(side, cos(turn)), ahead, sin(turn)), cos(lift)), up, sin(lift));
   const eye = plus(target, back, distance), right = unit(cross(up, back)), over = cross(back, right);
   // A pixel's direction is linear in (px, py, 1).
@@ -55,12 +53,4 @@ export function around(head, { target, turn, lift, distance }, width, height) {
   const clip = (axis, scale) => [...mul(axis, scale), -scale * dot(axis, eye)];
   const toClip = [clip(right, 2 / (k * width)), clip(over, 2 / (k * height)), [0, 0, 0, 0], clip(back, -1)].flat();
   return { toUv, eye, toClip };
-}
-
-// Where `around` begins: as the scene's camera sees it.
-export function startAround(head) {
-  const { target, back, radius } = head.around, up = upOf(head), [side, ahead] = levelOf(up);
-  const turn = Math.atan2(dot(back, ahead), dot(back, side));
-  const lift = Math.asin(Math.min(Math.max(dot(back, up), -0.99), 0.99));
-  return { target, turn, lift, distance: radius / Math.tan(HALF_ANGLE) };
 }

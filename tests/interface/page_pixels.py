@@ -24,15 +24,19 @@ BALL = {
     ],
 }
 LEVELS = 6
+MAP = """(({ gl, map }, values) => {
+    gl.bindFramebuffer(gl.FRAMEBUFFER, map.framebuffer);
+    gl.readPixels(0, 0, map.width, map.height, gl.RGBA, gl.FLOAT, values);
+    return values;
+})(spectrasplat.light, new Float32Array(4 * spectrasplat.light.map.width * spectrasplat.light.map.height))"""
+"""Light on the texels of all levels, rows from below."""
 
 
 def gathered(browser: Browser, to_uv: np.ndarray, width: int, height: int, thin: int = 1) -> np.ndarray:
     """Irradiance on the receiver (height, width, 3) that pixels show, top row first; `to_uv`: matrix of views.js. Sides
     are multiples of 32. `thin`: by one photon in so many."""
     browser.run(f"spectrasplat.light.gather({np.ravel(to_uv).tolist()}, {width}, {height}, 1, {thin})")
-    read = "(window.m = spectrasplat.light.readMap(), [m.width, m.height, m.stride])"
-    assert browser.run(read)[:2] == [width, height], "sides are multiples of 32"
-    stored = browser.floats("window.m.values").reshape(height, -1, 4)[..., :3].astype(float)
+    stored = browser.floats(MAP).reshape(height, 3 * width // 2, 4)[..., :3].astype(float)
     found = stored[:, :width].copy()
     for level in range(1, LEVELS):
         low, shape = height - (height >> level - 1), (height >> level, width >> level)

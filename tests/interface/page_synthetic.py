@@ -14,6 +14,8 @@ NM = np.arange(380.0, 781.0)
 N_AT_0, N_AT_1 = 1.56, 1.50
 TEXELS = 128
 """Across the map of these pages, of 2 by 2 units."""
+AXES = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+"""Of the horizon, and up."""
 STILL = io.BytesIO()
 Image.new("RGB", (64, 48), "grey").save(STILL, "jpeg")
 
@@ -35,18 +37,20 @@ def page(things: dict[str, np.ndarray], lines: list[list[float]] | None = None) 
     """One lamp: `lines` [[nm, W]], else a continuum. `things`: arrays by their names (docs/pages.md)."""
     head: dict[str, Any] = {
         "mode": "index", "n_at_0": N_AT_0, "n_at_1": N_AT_1, "title": "A test", "description": "Few photons.",
-        "scene": "test", "receiver": "floor", "exposure_ev": -8.0, "up": "y", "steps": [], "notes": ["A note."],
-        "lit": {"centre": [0, 0], "across": 2.0}, "around": {"target": [0, 0, 0], "back": [0, 0.8, 0.6], "radius": 1.5},
+        "scene": "test", "receiver": "floor", "exposure_ev": -8.0, "steps": [], "notes": ["A note."],
+        "lit": {"centre": [0, 0], "across": 2.0},
+        "around": {"target": [0, 0, 0], "axes": AXES, "turn": 0.0, "lift": 0.9, "radius": 1.5},
         "meshes": [],
-        "plane": {"origin": [0, 0, 0], "u": [1, 0, 0], "v": [0, 0, -1], "outline": []}, "limits": {"gain_max": 2.0},
-        "lights": [{"name": "lamp", "kind": "sun", "spectrum": 0}], "photons": {"unit": 1.0, "smoothing": 0.45},
+        "plane": {"origin": [0, 0, 0], "u": [1, 0, 0], "v": [0, 0, -1]}, "limits": {"gain_max": 2.0},
+        "lights": [{"spectrum": 0, "luminous": 1.0}], "photons": {"unit": 1.0, "smoothing": 0.45},
         "spectra": [{"name": "own", "lines": lines or []}, {"name": "line", "lines": [[546.1, 9.0]], "choice": True}],
         "glasses": [{"name": "own", "V_d": 40.0}, {"name": "other", "V_d": 30.0}],
         "groups": [{"name": "own", "objects": ["ball"], "row": 0, "choices": [0, 1]}],
     }  # fmt: skip
     arrays = things | {
         "still": np.frombuffer(STILL.getvalue(), "u1"),
-        "observer": OBSERVER.astype("f4"), "spectra.density": np.stack([EVEN * (not lines), 0 * EVEN]).astype("f4"),
+        "observer": OBSERVER.T.astype("f4"), "response": OBSERVER.T.astype("f4"),
+        "spectra.density": np.stack([EVEN * (not lines), 0 * EVEN]).astype("f4"),
         "glass_n": np.stack([glass(), glass(0.006)]).astype("f4"), "nm": NM.astype("f4"),
         "variable": glass()[None].astype("f4"),
     }  # fmt: skip

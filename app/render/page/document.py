@@ -31,7 +31,7 @@ def data_elements(arrays: Mapping[str, np.ndarray], head: Mapping[str, Any]) -> 
         data = np.ascontiguousarray(values)
         listed[name] = {"dtype": _DTYPES[data.dtype.name], "shape": list(data.shape), "offset": len(blob)}
         blob += data.astype(data.dtype.newbyteorder("<")).tobytes()
-    text = json.dumps({**head, "compressed": True, "arrays": listed}, ensure_ascii=False, allow_nan=False)
+    text = json.dumps({**head, "arrays": listed}, ensure_ascii=False, allow_nan=False)
     packed = base64.b64encode(zlib.compress(bytes(blob), 6)).decode()
     return (
         f'<script type="application/json" id="head">{text.replace("<", chr(92) + "u003c")}</script>\n'

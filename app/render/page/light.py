@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...base.errors import UserError
-from ...beams.facets import convex_hull
 from ...gpu.records import EDGE_BIT, LATTICE_BIT
 from ...gpu.spectral_groups import samples_of
 from ...model.optics.colorimetry import VISIBLE_NM
@@ -52,7 +51,6 @@ def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
     buffers = light.buffers
     item = buffers.receivers[receiver]
     frame = plane_frame(buffers.space.to_gpu(buffers.world_meshes[item].vertices))
-    scale = buffers.space.scale
     nm, samples = samples_of(buffers.axis)
     arrays: dict[str, np.ndarray] = {"nm": nm.astype("f4"), "variable": buffers.variables.astype("f4")}
     head: dict[str, Any] = {"mode": "wavelength"}
@@ -74,17 +72,14 @@ def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
     unit = float(photons["throughput"].max(initial=0.0)) or 1.0
     photons["throughput"] = (photons["throughput"] / unit).astype("f2")
     photons["x"] = np.rint(np.clip(photons["x"], 0.0, 1.0) * 65535.0).astype("u2")
-    head["photons"] = {"unit": unit, "smoothing": light.light_pass.smoothing, "count": len(photons["x"])}
+    head["photons"] = {"unit": unit, "smoothing": light.light_pass.smoothing}
     arrays |= {f"photons.{name}": values for name, values in photons.items()}
     if len(beams["x"]):
         arrays |= {f"beams.{name}": values for name, values in beams.items()}
-    outline = frame.project(buffers.space.to_gpu(buffers.world_meshes[item].vertices)) / scale
-    outline = outline[convex_hull(outline)]
     head["plane"] = {
         "origin": buffers.space.to_world(frame.origin).tolist(),
         "u": frame.axes[0].tolist(),
         "v": frame.axes[1].tolist(),
-        "outline": outline.tolist(),
     }
     return PageLight(arrays, head, frame, item)
 

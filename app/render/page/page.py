@@ -172,17 +172,18 @@ def page_steps(
         size = settings.width, settings.height
         item = light.item
         to_plane = pixels_to_plane(stage.camera, *size, light.frame, live.buffers)
-        around = first_look(stage.camera, light.frame, light.head["lit"], live.buffers)
+        around = first_look(stage.camera, up_of(scene), light.frame, light.head["lit"], live.buffers)
         weight = weight_of(context, live.buffers, stage.camera, size, item)
     finally:
         engine.release()
     rgb, caustic = yield from _still(context, stage, settings)
     exposure = auto_exposure(rgb) + (settings.exposure_ev or 0.0)
     still = shown_bytes(rgb, settings.exposure_ev or 0.0, settings.glare, scene.render.antialias_highlights, ".jpg")
+    material = scene.objects[item].material
     picture = page_picture(rgb, caustic, weight, exposure, still)
     camera = picture.head | {"pixel_to_uv": to_plane.tolist()}
     meshes, shapes = _meshes(scene, item)
-    tables, spectra = _spectra(scene)
+    tables, spectra = _spectra(scene, material.reflectance)
     arrays = {**light.arrays, **picture.arrays, **shapes, **tables, **groups.arrays}
     notes = [_STAYS, _MADE.format(__version__, scene.name, scene.objects[item].name)]
     if glasses.own is None and groups.head["groups"]:
@@ -193,11 +194,7 @@ def page_steps(
         "around": around,
         "meshes": meshes,
         "exposure_ev": exposure,
-        "photons_emitted": settings.photons,
     }
-    material = scene.objects[item].material
-    if material.reflectance is not None:
-        arrays["reflectance"] = np.asarray(material.reflectance, "f4")
     head["reflectance_rgb"] = [1.0] * 3 if material.reflectance is not None else list(material.reflectance_rgb)
     yield 1.0
     return Page(arrays, head)
@@ -285,23 +282,19 @@ def straight_gains(arrays: Mapping[str, np.ndarray], index: np.ndarray) -> tuple
     return max(1.0 - within, 0.0), min(1.0 + within, GAIN_MAX)
 
 
-def _spectra(scene: Scene) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+def _spectra(scene: Scene, reflectance: np.ndarray | None) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Of the lights, and of 1 lm each to choose; what the eye sees of a nanometre's light, and that after a receiver's
+    `reflectance` (by nm), linear Rec.709 by rows."""
+    observer = xyz_to_rgb709(K_M * cmf_xyz()).T
     spectra: list[tuple[str, Spectrum, bool]] = [(light.name, light.spectral_power, False) for light in scene.lights]
-    spectra += [(name, spectrum, True) for name, spectrum in offered_spectra().items()]
+    spectra += [(name, spectrum.scaled_to_luminous(1.0), True) for name, spectrum in offered_spectra().items()]
     arrays = {
         "spectra.density": np.array([spectrum.density for _, spectrum, _ in spectra], "f4"),
-        "observer": xyz_to_rgb709(K_M * cmf_xyz()).astype("f4"),
-        "cmf": cmf_xyz().astype("f4"),
+        "observer": observer.astype("f4"),
+        "response": (observer if reflectance is None else observer * reflectance).astype("f4"),
     }
     listed = [{"name": n, "lines": [list(line) for line in s.lines], "choice": choice} for n, s, choice in spectra]
-    lights = []
-    for i, light in enumerate(scene.lights):
-        entry: dict[str, Any] = {"name": light.name, "kind": light.kind, "spectrum": i}
-        if light.has_place:
-            entry["position"] = list(light.position)
-        if light.has_direction:
-            entry["direction"] = list(light.direction)
-        lights.append(entry)
+    lights = [{"spectrum": i, "luminous": light.spectral_power.luminous()} for i, light in enumerate(scene.lights)]
     return arrays, {"spectra": listed, "lights": lights}
 
 
@@ -347,5 +340,4 @@ def _said(scene: Scene, receiver: int, words: PageWords) -> dict[str, Any]:
         "steps": [dict(step) for step in words.steps],
         "scene": scene.name,
         "receiver": scene.objects[receiver].name,
-        "up": up_of(scene),
     }

@@ -13,6 +13,7 @@ from ...gpu.context import Context
 from ...gpu.scene_buffers import SceneBuffers
 from ...model.scene import Camera
 from ...model.scene_camera import camera_frame
+from ...model.staging import UpAxis
 from ...passes.camera_records import camera_parameters
 from ...passes.first_surfaces import FirstSurfaces
 from ...passes.plane_frame import PlaneFrame
@@ -90,13 +91,18 @@ def weight_of(context: Context, buffers: SceneBuffers, camera: Camera, size: tup
     return weight / np.pi
 
 
-def first_look(camera: Camera, frame: PlaneFrame, lit: dict[str, Any], buffers: SceneBuffers) -> dict[str, Any]:
+def first_look(
+    camera: Camera, up: UpAxis, frame: PlaneFrame, lit: dict[str, Any], buffers: SceneBuffers
+) -> dict[str, Any]:
     """What a look all round begins with: the camera's own framing, `radius` to either side of a `target` in its middle,
-    as far away as the light."""
+    as far away as the light: `turn` and `lift` of the eye, radians, about `axes`, two of the horizon and up."""
     _, _, forward = camera_frame(camera)
     position = np.asarray(camera.position, float)
     light = buffers.space.to_world(frame.origin) + np.asarray(lit["centre"]) @ frame.axes
     away = max(float(forward @ (light - position)), 0.5 * lit["across"])
     flat = camera.kind == "orthographic"
     radius = 0.5 * camera.vertical_extent if flat else away * np.tan(np.radians(0.5 * camera.vertical_fov_deg))
-    return {"target": (position + away * forward).tolist(), "back": (-forward).tolist(), "radius": float(radius)}
+    axes = [[0, 0, 1], [1, 0, 0], [0, 1, 0]] if up == "y" else [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]
+    side, ahead, above = np.array(axes) @ -forward
+    turns = {"turn": float(np.arctan2(ahead, side)), "lift": float(np.arcsin(np.clip(above, -0.99, 0.99)))}
+    return {"target": (position + away * forward).tolist(), "axes": axes, "radius": float(radius)} | turns
