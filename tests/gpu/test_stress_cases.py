@@ -101,6 +101,13 @@ MUTANTS = {
         "return -index_slope(boundary.before",
         "band ends",
     ),
+    "light lost between microfacets": (
+        "rough-mirror",
+        "lib/rough_energy.glsl",
+        "return reflected / (1.0 - thrown * reflected);",
+        "return reflected;",
+        "energy",
+    ),
     "overflow not seen": ("overflow", "light/footprint.comp", "    if (held < 1.0) {", "    if (held < -1.0) {", ""),
     "lost footprints not counted": (
         "overflow",

@@ -1,5 +1,5 @@
 """Materials at the edge of what there is: indices of a gas and of germanium, dispersion without bound, the gem of the
-literature, and gratings whose orders are about to become evanescent."""
+literature, rough mirrors, and gratings whose orders are about to become evanescent."""
 
 from __future__ import annotations
 
@@ -16,10 +16,11 @@ from ...model.geometry.primitives import slab
 from ...model.geometry.primitives_gem import brilliant
 from ...model.io.scene_file import load_scene
 from ...model.optics.glass import Dispersion, cauchy, constant, from_abbe, sellmeier, table
-from ...model.scene import Dielectric, Diffuse, Grating
+from ...model.scene import Dielectric, Diffuse, Grating, Mirror
 from ...reference import optics
 from ...reference.optics import unit
 from ..case import EPSILON, Held, Measured, Measurement, case, judged, length, not_finite_in
+from ..rigs.camera_probe import FEW, render_probe, seen, straight, together, white_furnace
 from ..rigs.gpu_paths import (
     REFRACTED,
     Photons,
@@ -204,6 +205,21 @@ def gem_cut(context: Context, widths_nm: Sequence[float]) -> Measured:
         label = f"{band[0]:.0f} to {band[1]:.0f} nm"
         note = f"{len(cut_n)} cut bands, {len(whole.records)} landings in the brilliant"
         yield Measurement(width, label, bad, *judged(held), photons.tally.imbalance, counts, note=note)
+
+
+@case("rough-mirror", "roughness", (1e-3, 0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0))
+def rough_mirror(context: Context, roughnesses: Sequence[float]) -> Measured:
+    """A mirror that loses nothing, from polished to matt, in a white furnace
+
+    Its microfacets may be too narrow for float32, or so wide, and met so flatly, that most light meets several: what
+    one sends on and what the rest does, by a table, must be all that came."""
+    for roughness in roughnesses:
+        sheet, sights, held = placed("sheet", screen(np.zeros(3), UP, 1.0), Mirror(roughness=roughness)), [], {}
+        for degrees in (5.0, 60.0, 85.0):
+            way = [np.sin(np.radians(degrees)), 0.0, -np.cos(np.radians(degrees))]
+            sights.append(render_probe(context, white_furnace(sheet, camera=straight(np.zeros(3), way, 0.01)), FEW))
+            held[f"energy at {degrees:g}°"] = np.abs(sights[-1].mean - 1.0).max(), 0.01
+        yield seen(roughness, f"{roughness:g}", together(*sights), held)
 
 
 # ---- gratings --------------------------------------------------------------------------------
