@@ -167,11 +167,12 @@ bool in_front(Placement place, PhotonRecord photon, vec3 sweep_middle, vec3 swee
 uint choose_level(uint at, inout Footprint f, PhotonRecord photon, vec3 middle, vec3 sweep) {
     Placement place = placements[at];
     if (place.kind == PLACED_PICTURE) {
-        Footprint g = footprint_in(placements[place.blurred], photon, middle, sweep);
+        Placement pixels = placements[place.blurred];
+        Footprint g = footprint_in(pixels, photon, middle, sweep);
         if (area_of_all(g) < WHOLE_PIXELS) return at;
         f = g;
         at = place.blurred;
-        place = placements[at];
+        place = pixels;
     }
     for (int step = 0; step < WIDER_LEVELS; ++step) {
         if (place.blurred != NONE && thin_variance(f) > BROAD_VARIANCE) {

@@ -182,8 +182,8 @@ def test_seconds_are_kept(render: Render, monkeypatch: pytest.MonkeyPatch) -> No
     full = luminance(render(scene, "--layer caustic --photons 100k")).sum()
     started = time.perf_counter()
     timed = luminance(render(scene, "--layer caustic --seconds 1")).sum()
-    # Programs and the camera come on top, and other tests run beside this one.
-    assert 0.9 <= time.perf_counter() - started < 20.0
+    # The last round may be foreseen to take too long; programs, the camera and other tests come on top.
+    assert 0.5 <= time.perf_counter() - started < 20.0
     assert timed == pytest.approx(full, rel=0.03)
     assert int(re.search(r"([\d,]+) photons", render.said)[1].replace(",", "")) >= 5_000  # type: ignore[attr-defined, index]
 
