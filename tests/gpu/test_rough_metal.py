@@ -66,7 +66,7 @@ def test_a_rough_mirror_in_a_furnace(
     scene = Scene("furnace", camera, (), (sheet,), background_rgb=(1.0, 1.0, 1.0))
     scene = replace(scene, render=replace(scene.render, polarisation=polarised))
     expected = daylight_mean(reflected_in_all(metal, degrees, max(roughness**2, 1e-4)))
-    assert render_probe(gl, scene, resized(PROBE, 24, 16, 64)).mean == pytest.approx(expected, rel=4e-3)
+    assert render_probe(gl, scene, resized(PROBE, 24, 16, 256)).mean == pytest.approx(expected, rel=4e-3)
 
 
 def lit(roughness: float, metal: str = "gold", turn_deg: float = 35.0, lamp: object = None) -> Scene:
