@@ -42,6 +42,8 @@ class Lesson:
     ray_count: int = 5
     reflections: int = 0
     """Reflections of the rays within the object, before they leave it."""
+    target: str = ""
+    """Picture that a caustic plate was made for, from the scene's folder; the plate check begins with it."""
     page: tuple[PageStep, ...] = ()
     """Steps of its page for browsers, instead of `steps`."""
 

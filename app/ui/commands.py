@@ -329,7 +329,7 @@ PANELS = _group(
     ),
     _panel("Solve", "", "solve", "The picture's derivative by a number; which glass casts a picture or a width."),
     _panel("Rays", "", "rays", "Deviation and focal length of the ray overlay, by wavelength."),
-    _panel("Lesson", "", "lesson", "Six lessons: a scene each, a few sentences, what to try."),
+    _panel("Lesson", "", "lesson", "Lessons: a scene each, a few sentences, what to try."),
     _panel("History", "", "history", "All steps that can be undone."),
     _panel("Export", "", "export", "Renderings, screenshots, baked maps, animations."),
 )

@@ -222,6 +222,8 @@ class Session:
         state = replace(self.state, lesson=lesson.name, selection=chosen).with_display(
             ray_overlay=lesson.rays, ray_count=lesson.ray_count, ray_reflections=lesson.reflections
         )
+        if lesson.target:
+            state = replace(state, solve=replace(state.solve, plate_target=lesson.path.parent / lesson.target))
         self.state = state.with_panels(lesson=True, rays=lesson.rays or self._panels_before.rays)
 
     def show_losses(self) -> None:

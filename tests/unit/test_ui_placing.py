@@ -206,11 +206,12 @@ def test_small_angles_are_exact() -> None:
 def test_each_lesson_has_a_scene_that_holds_what_it_is_about(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    assert len(lessons()) == 8 and main(["lesson"]) == 0
+    assert len(lessons()) == 9 and main(["lesson"]) == 0
     listed = capsys.readouterr().out
     for each in lessons():
         scene = load_scene(each.path)
         assert each.select in [item.name for item in scene.objects]
+        assert not each.target or (each.path.parent / each.target).is_file()
         assert 3 <= len(each.steps) <= 5 and 100 < len(each.words) < 400
         assert each.name in listed and each.title in listed
 
