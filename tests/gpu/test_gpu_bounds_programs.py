@@ -18,9 +18,12 @@ from spectrasplat.model.settings import RenderSettings
 
 SCENES = sorted((assets_dir() / "scenes").glob("*.toml"), key=lambda path: path.stem)
 MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES, MOST_SCENE_BYTES = 220, 64, 75_000, 500_000
-LARGE = {"camera/camera.comp": (MOST_LIVE, 76, 99_000), "light/trace.comp": (226, MOST_ARRAY_WORDS, 87_000)}
+LARGE = {"camera/camera.comp": (246, 76, 99_000), "light/trace.comp": (226, MOST_ARRAY_WORDS, 88_000)}
 """Programs that follow paths: more live words, array words or text than is wanted of any, which is not met since
-27 November 2026."""
+27 November 2026. Live in the camera's at the most: a path, its event and a film's shares of both polarisations."""
+OF_CRYSTALS = {"camera/camera.comp": (442, 76, 108_000), "light/trace.comp": (526, MOST_ARRAY_WORDS, 97_000)}
+"""Likewise where there are crystals: the fields of six waves at an interface are 4×4 matrices, inlined once a place of
+the band. More than a GPU has registers for: some of it is in memory there."""
 _held: set[tuple[str, ...]] = set()
 """Texts that were looked at."""
 
@@ -44,7 +47,8 @@ def check(programs: list[Built]) -> None:
         if built.texts in _held:
             continue
         _held.add(built.texts)
-        most_live, most_array_words, most_bytes = LARGE.get(built.name, (MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES))
+        large = OF_CRYSTALS if "cross_interface(" in built.texts[0] else LARGE
+        most_live, most_array_words, most_bytes = large.get(built.name, (MOST_LIVE, MOST_ARRAY_WORDS, MOST_BYTES))
         assert max(map(len, built.texts)) <= most_bytes, built.name
         if strict_compilers.missing():
             continue
