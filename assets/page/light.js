@@ -23,10 +23,10 @@ export class Light {
     // Sums in 32 bits where they can be blended; in 16 otherwise, less exact in bright places.
     this.isFull = Boolean(gl.getExtension("EXT_color_buffer_float") && gl.getExtension("EXT_float_blend"));
     gl.getExtension("EXT_color_buffer_half_float");
-    this.splats = this.program(SPLAT_VERTEX, SPLAT_FRAGMENT, `const bool BENT = ${head.mode !== "index"};\n`);
-    this.beams = this.program(BEAM_VERTEX, BEAM_FRAGMENT, `const int MOST = ${Math.max(beams.most, 1)};  // edges of a polygon\n`);
-    this.view = this.program(WHOLE_VERTEX, VIEW_FRAGMENT, "");
-    this.solid = this.program(SOLID_VERTEX, SOLID_FRAGMENT, "");
+    this.splats = this.program(SPLAT_VERTEX, SPLAT_FRAGMENT);
+    this.beams = this.program(BEAM_VERTEX, BEAM_FRAGMENT(Math.max(beams.most, 1)));
+    this.view = this.program(WHOLE_VERTEX, VIEW_FRAGMENT);
+    this.solid = this.program(SOLID_VERTEX, SOLID_FRAGMENT);
     this.paths = this.texture();
     this.light = this.texture();
     this.edges = this.texture();
@@ -47,11 +47,11 @@ export class Light {
 
   // ---- what is uploaded -----------------------------------------------------------------------
 
-  program(vertex, fragment, more) {
+  program(vertex, fragment) {
     const { gl } = this, program = gl.createProgram();
     for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
       const shader = gl.createShader(kind);
-      gl.shaderSource(shader, text.replace("precision highp float;\n", `precision highp float;\n${more}`));
+      gl.shaderSource(shader, text);
       gl.compileShader(shader);
       gl.attachShader(program, shader);
     }

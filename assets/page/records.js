@@ -20,7 +20,7 @@ export function photonRows(head, array, shapeOf) {
   return { rows, count };
 }
 
-// A rectangle that holds the polygon; edges and row; density; slope; x and least penumbra, 0. Edges about its middle, two texels each.
+// A rectangle that holds the polygon; edges and row; density; slope; x, 0. Edges about its middle, two texels each.
 export function beamRows(array) {
   const x = array("beams.x"), count = x ? x.length / 2 : 0, rows = table(count, BEAM);
   if (!count) return { rows, count, most: 0, edges: new Float32Array(0) };
@@ -35,7 +35,6 @@ export function beamRows(array) {
     // Of a polygon narrower than its penumbrae only their mean is seen: all its edges are as soft.
     const softness = Array.from(edge.subarray(8 * first[i], 8 * first[i + 1])).filter((_, k) => k % 4 === 3).map((soft) => Math.max(soft, 0));
     const widest = Math.max(...softness), isNarrow = Math.sqrt(4 * half[0] * half[1]) < 4 * widest;
-    rows[BEAM * i + 18] = isNarrow ? widest : Math.min(...softness);
     most = Math.max(most, first[i + 1] - first[i]);
     for (let e = first[i]; e < first[i + 1]; e++) {
       const line = edge.subarray(8 * e, 8 * e + 8);

@@ -66,7 +66,7 @@ vec4 place_v2;  // where the anchor lands; change with the third index
 vec4 v01;       // change with the first and the second index
 vec4 span;      // x: from, anchor, to; row of the light's table
 flat out vec4 band;       // x: from, anchor, to; standard deviation
-flat out vec4 weights;    // throughput at the anchor, its slopes below and above; bend of the sweep
+flat out vec3 weights;    // throughput at the anchor, its slopes below and above
 flat out vec3 shape;      // half a texel across; 1 / standard deviation along; row
 flat out vec3 ripple;
 flat out vec4 rect;
@@ -137,11 +137,6 @@ void main() {
   float length2 = dot(longest, longest);
   if (smoothed * sqrt(length2) > 0.75) fan += widens / length2 * longest;
   s *= smoothed; t *= smoothed;
-  float bend = 0.0;
-  if (BENT) {
-    vec2 half_way = j * (shift_to(0.5 * (x_lo + x_hi)) - to_lo);
-    bend = clamp(4.0 * dot(half_way, chord) / max(dot(chord, chord), 1e-12) - 2.0, -0.9, 0.9);
-  }
   // Broad photons go to coarser texels, whose bilinear reading blurs them too.
   vec3 cov = vec3(s.x * s.x + t.x * t.x, s.x * s.y + t.x * t.y, s.y * s.y + t.y * t.y);
   float difference = 0.5 * (cov.x - cov.z), radius = sqrt(difference * difference + cov.y * cov.y);
@@ -235,9 +230,8 @@ void main() {
   }
   at.xy = vec2(corner.y * edge * SQRT_HALF / root, 0.5 + corner.x * reach / sweep);
   band = vec4(x_lo, span.y, x_hi, sigma / sweep);
-  weights = amplitude * vec4(carried.y, (carried.y - carried.x) / max(span.y - span.x, 1e-6),
-    (carried.z - carried.y) / max(span.z - span.y, 1e-6), 0.0);
-  weights.w = bend;
+  weights = amplitude * vec3(carried.y, (carried.y - carried.x) / max(span.y - span.x, 1e-6),
+    (carried.z - carried.y) / max(span.z - span.y, 1e-6));
   shape = vec3(0.5 * box * SQRT_HALF / root, 1.0 / sigma, span.w);
   rect = rect_of(level);
   vec2 beside = corner.x * long_side + corner.y * short_side;
@@ -246,21 +240,11 @@ void main() {
 }`;
 
 export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + `
-flat in vec4 band, weights, rect;
-flat in vec3 shape, ripple;
+flat in vec4 band, rect;
+flat in vec3 weights, shape, ripple;
 in vec4 at;
 in float lit;
 out vec4 deposited;
-// Where in the band, 0 to 1, what lands a share of the way along the sweep is.
-float in_band(float way) {
-  if (!BENT || abs(weights.w) < 1e-3) return way;
-  float c = weights.w, b = 1.0 + c, root = b * b - 4.0 * c * clamp(way, 0.0, 1.0);
-  return (b - sqrt(max(root, 0.0))) / (2.0 * c);
-}
-float way_to(float x) {
-  float f = (x - band.x) / (band.z - band.x);
-  return BENT ? f + weights.w * f * (1.0 - f) : f;
-}
 float carried_at(float x) {
   return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0);
 }
@@ -277,10 +261,10 @@ void main() {
   float s = band.w, from = clamp(at.y - 3.0 * s, 0.0, 1.0), to = clamp(at.y + 3.0 * s, 0.0, 1.0);
   int parts = clamp(int(ceil(1.3 * (to - from) / s)), 3, 8);
   float step_way = (to - from) / float(parts), own = sqrt(s * s - step_way * step_way / 12.0);
-  float x_from = mix(band.x, band.z, in_band(from));
+  float x_from = mix(band.x, band.z, from);
   vec3 sum = vec3(0.0), before = energy_below(row, x_from);
   for (int i = 1; i <= parts; ++i) {
-    float way = from + float(i) * step_way, x = mix(band.x, band.z, in_band(way));
+    float way = from + float(i) * step_way, x = mix(band.x, band.z, way);
     vec3 now = energy_below(row, x);
     sum += (now - before) * normal((way - 0.5 * step_way - at.y) / own) * carried_at(0.5 * (x_from + x));
     before = now;
@@ -290,26 +274,26 @@ void main() {
   for (int k = 0; k < lines; ++k) {
     vec4 line = line_of(row, k);
     if (line.w < band.x || line.w >= band.z) continue;
-    sum += line.rgb * normal((way_to(line.w) - at.y) / s) * shape.y * carried_at(line.w);
+    sum += line.rgb * normal(((line.w - band.x) / (band.z - band.x) - at.y) / s) * shape.y * carried_at(line.w);
   }
   deposited = vec4(share * sum, 0.0);
 }`;
 
 export const BEAM_VERTEX = COMMON + TABLES + RECORDS(5) + `
 flat out vec4 parabola, tilt, band;
-flat out vec3 about;
+flat out vec2 about;
 flat out ivec3 list;
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   vec4 quad = record(0);     // middle, half of its long side
   vec4 more = record(1);     // half of its short side (length), first edge, edges, row
-  vec4 span = record(4);     // x: from, to; least penumbra, units; 0
+  vec4 span = record(4);     // x: from, to; 0
   if (span.y <= support.x || span.x >= support.y) return;
   vec2 corner = corner();
   float reach = length(quad.zw);
   vec2 e = reach > 0.0 ? quad.zw / reach : vec2(1.0, 0.0);
   vec2 right = e * reach, up = vec2(-e.y, e.x) * more.x;
-  vec3 seen = to_texel * vec3(quad.xy + corner.x * right + corner.y * up, 1.0), middle = to_texel * vec3(quad.xy, 1.0);
+  vec3 seen = to_texel * vec3(quad.xy + corner.x * right + corner.y * up, 1.0);
   // A texel farther out, as the sides go there.
   vec2 at = seen.xy / seen.z;
   vec2 along = (to_texel * vec3(right, 0.0)).xy - at * dot(vec2(to_texel[0].z, to_texel[1].z), right),
@@ -323,21 +307,16 @@ void main() {
   parabola = record(2);  // 1, t, t²; 0
   tilt = record(3);      // relative, per unit; about
   band = vec4(span.xy, 0.0, 0.0);
-  // Soft ones in texels as coarse as a quarter of their penumbrae.
-  float soft = span.z / sqrt(texel_area(middle.xy / middle.z));
-  int level = clamp(int(floor(log2(0.25 * sqrt(1.0 + 4.0 * soft * soft)))), 0, LEVELS - 1);
-  if (middle.z <= 0.0) level = 0;
-  about = vec3(quad.xy, level);
-  vec2 low = rect_of(level).xy;
-  float finer = exp2(float(-level));
+  about = quad.xy;
   list = ivec3(more.yzw);
-  gl_Position = vec4((seen.xy * finer + (margin + low) * seen.z) / vec2(1.5 * float(size.x), size.y) * 2.0 - seen.z, 0.0, seen.z);
+  gl_Position = vec4((seen.xy + margin * seen.z) / vec2(1.5 * float(size.x), size.y) * 2.0 - seen.z, 0.0, seen.z);
 }`;
 
-export const BEAM_FRAGMENT = COMMON + TABLES + `
+// `most`: edges of a polygon.
+export const BEAM_FRAGMENT = (most) => COMMON + TABLES + `
 uniform sampler2D edges;    // two texels an edge: x, y, c, softness at the band's start; their change
 flat in vec4 parabola, tilt, band;
-flat in vec3 about;          // the rectangle's middle; level
+flat in vec2 about;          // the rectangle's middle
 flat in ivec3 list;
 out vec4 deposited;
 vec4 edge_texel(int i) { return texelFetch(edges, ivec2(i & 1023, i >> 10), 0); }
@@ -364,7 +343,7 @@ vec2 in_texel(vec2 n, float h) {
   return vec2(max(low.x, low.y), min(high.x, high.y));
 }
 float covered(float t) {
-  vec3 lines[MOST];
+  vec3 lines[${most}];
   int count = 0;
   for (int i = 0; i < list.y; ++i) {
     vec3 own = line_at(list.x + i, t);
@@ -415,15 +394,13 @@ void add(vec2 interval, int parts, bool whole) {
   }
 }
 void main() {
-  vec4 rect = rect_of(int(about.z));
-  if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
-  float wider = exp2(about.z);
-  vec2 texel = (gl_FragCoord.xy - rect.xy) * wider;
+  vec2 texel = gl_FragCoord.xy;
+  if (any(greaterThanEqual(texel, vec2(size)))) discard;
   vec3 uvw = to_uv * vec3(texel, 1.0);
   if (uvw.z <= 0.0) discard;
   vec2 uv = uvw.xy / uvw.z;
-  place = uv - about.xy;
-  sides = mat2(to_uv[0].xy - uv * to_uv[0].z, to_uv[1].xy - uv * to_uv[1].z) * wider / uvw.z;
+  place = uv - about;
+  sides = mat2(to_uv[0].xy - uv * to_uv[0].z, to_uv[1].xy - uv * to_uv[1].z) / uvw.z;
   float wide = band.y - band.x;
   vec2 lit = wide > 0.0 ? (clamp(support, band.xx, band.yy) - band.x) / wide : vec2(0.0, 1.0), touched = lit, whole = lit;
   float moves = 0.0;  // texels, of the edges that matter
@@ -449,7 +426,7 @@ void main() {
     float t = (line.w - band.x) / wide;
     if (t >= touched.x && t <= touched.y) sum += covered(t) * (parabola.x + t * (parabola.y + t * parabola.z)) * line.rgb;
   }
-  deposited = vec4(max(1.0 + dot(tilt.xy, uv - tilt.zw), 0.0) * texel_area(texel) * wider * wider * sum, 0.0);
+  deposited = vec4(max(1.0 + dot(tilt.xy, uv - tilt.zw), 0.0) * texel_area(texel) * sum, 0.0);
 }`;
 
 export const WHOLE_VERTEX = `#version 300 es
