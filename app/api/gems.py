@@ -9,9 +9,9 @@ from pathlib import Path
 from ..base.errors import UserError
 from ..commands.gem import glass_called, on_table, stone_at
 from ..commands.scenes import find_scene
-from ..model.gem_scene import stone_in
-from ..model.optics.gem_figures import ASET_HEAD_DEG, GemFigures
-from ..model.optics.gem_report import GemReport, gem_report
+from ..model.gems.figures import ASET_HEAD_DEG, GemFigures
+from ..model.gems.in_scene import stone_in
+from ..model.gems.report import GemReport, gem_report
 from .device import Cancel, Device, Progress
 from .scene import Scene
 

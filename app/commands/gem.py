@@ -14,8 +14,8 @@ from .scenes import find_scene
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
-    from ..model.optics.gem_figures import Cancelled, Report, Stone
-    from ..model.optics.gem_report import GemReport, TableFire
+    from ..model.gems.figures import Cancelled, Report, Stone
+    from ..model.gems.report import GemReport, TableFire
     from ..model.optics.glass import Dispersion
     from .solving_table import Gem
 
@@ -27,7 +27,7 @@ def gem(options: Gem) -> int:
     from ..base.atomic import check_writable
     from ..base.interrupts import interrupt_flag
     from ..base.progress import ProgressReporter
-    from ..model.optics.gem_report import PICTURES, gem_report
+    from ..model.gems.report import PICTURES, gem_report
 
     output = options.output
     if output is not None:
@@ -67,7 +67,7 @@ def gem(options: Gem) -> int:
 
 def stone_at(path: Path, name: str | None, glass: str | None, up: str) -> Stone:
     """The stone in a file: of a scene its object `name`, or its first solid of glass. Raises `UserError`."""
-    from ..model.gem_scene import stone_in
+    from ..model.gems.in_scene import stone_in
     from ..model.io.scene_file import load_scene
     from ..model.staging import AS_FOUND, Staging
 

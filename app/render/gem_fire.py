@@ -8,9 +8,9 @@ import numpy as np
 
 from ..edit.parameters import Stage
 from ..gpu.context import Context
-from ..model.gem_scene import TABLE, under_lamp
-from ..model.optics.gem_figures import Stone
-from ..model.optics.gem_report import TableFire
+from ..model.gems.figures import Stone
+from ..model.gems.in_scene import TABLE, under_lamp
+from ..model.gems.report import TableFire
 from ..model.settings import RenderSettings
 from .bake import bake_map
 

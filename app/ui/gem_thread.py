@@ -7,8 +7,8 @@ import threading
 from ..base.errors import UserError, own_fault
 from ..base.not_yet import NOT_YET, NotYet
 from ..edit.state import State
-from ..model.gem_scene import chosen_stone, stone_in
-from ..model.optics.gem_figures import GemFigures, figures
+from ..model.gems.figures import GemFigures, figures
+from ..model.gems.in_scene import chosen_stone, stone_in
 from ..model.scene import Scene, SceneObject
 
 GemReading = tuple[str, GemFigures] | str | NotYet

@@ -14,12 +14,13 @@ import spectrasplat as ss
 from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
+from spectrasplat.model.gems import paths as gem_paths
+from spectrasplat.model.gems.figures import UP, face_places, figures, look, seen_mean, stone_of, tilted
+from spectrasplat.model.gems.report import TILTS_DEG, gem_report, shown
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.geometry.primitives import box, brilliant, prism
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.optics import catalogue, gem_paths, glass
-from spectrasplat.model.optics.gem_figures import UP, face_places, figures, look, seen_mean, stone_of, tilted
-from spectrasplat.model.optics.gem_report import TILTS_DEG, gem_report, shown
+from spectrasplat.model.optics import catalogue, glass
 from spectrasplat.model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 
 DIAMOND = catalogue.find("diamond")

@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..gems.facet_design import SUFFIX as DESIGN_SUFFIX
-from ..gems.stone import stone_of
+from ..gems.opened_design import object_of_design
 from ..geometry.mesh import Mesh
 from ..geometry.mesh_health import connected_roots, forms_of, weld_map
 from ..materials.dielectric import DEFAULT_GLASS
@@ -36,7 +36,7 @@ def objects_of_mesh(path: Path, staging: Staging, notes: list[str]) -> list[Scen
     of it is made of glass, since nobody opens a mesh here to see it grey. Raises UserError for what cannot be read.
     """
     if path.suffix.lower() == DESIGN_SUFFIX:
-        return with_glass([stone_of(path, staging, notes)], staging, path.name, [""])
+        return with_glass([object_of_design(path, staging, notes)], staging, path.name, [""])
     whole, groups = load_grouped_mesh(path)
     parts = parts_of_mesh(whole, groups)
     libraries = () if groups is None else groups.libraries

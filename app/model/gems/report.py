@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from .gem_figures import (
+from ..optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
+from .figures import (
     ASET_HEAD_DEG,
     UP,
     Cancelled,
@@ -23,7 +24,6 @@ from .gem_figures import (
     seen_places,
     tilted,
 )
-from .glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 
 SIDE = 512
 """Pixels of a picture's side; …"""
@@ -141,14 +141,14 @@ def gem_report(
 
 
 def _above(sums: np.ndarray) -> float:
-    from .gem_paths import HEAD, HIGH, LOW
+    from .paths import HEAD, HIGH, LOW
 
     return float(sums[HEAD] + sums[HIGH] + sums[LOW])
 
 
 def _tilt(stone: Stone, axis: int, angle_deg: float, head_deg: float) -> tuple[float, float, float]:
     """Light return by ISO and COS, and the first with the head's shadow, of a stone tilted about x or y."""
-    from .gem_paths import COSINE, HEAD
+    from .paths import COSINE, HEAD
 
     way = tilted(angle_deg, 0.0) if axis == 0 else tilted(0.0, angle_deg)
     sums = seen_mean(look(stone, seen_places(_TILT_COUNT, way), way, way, head_deg))
@@ -168,7 +168,7 @@ def shown(sums: np.ndarray, name: str) -> np.ndarray:
     """The picture of that name out of the sums of `look` at `face_places`, float32 (H, H, 3), linear Rec.709."""
     from ...base.colour_maps import FALSE_COLOUR, sample
     from ...base.tone_map import srgb_eotf
-    from .gem_paths import HEAD, HIGH, LEAK, LOW, SPREAD
+    from .paths import HEAD, HIGH, LEAK, LOW, SPREAD
 
     head, high, low, leak = (sums[:, column, None] for column in (HEAD, HIGH, LOW, LEAK))
     sees = sums[:, :6].sum(axis=1, keepdims=True) > 0.0

@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..base.errors import UserError, suggestion
-from .geometry.mesh import Mesh, note_recipe
-from .geometry.primitives import plane
-from .lights.light import DEFAULT_ILLUMINANCE
-from .lights.outlined import CollimatedLight
-from .naming import listed
-from .optics.gem_figures import Stone, stone_of
-from .optics.glass import Dispersion
-from .optics.spectrum import illuminant
-from .scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+from ...base.errors import UserError, suggestion
+from ..geometry.mesh import Mesh, note_recipe
+from ..geometry.primitives import plane
+from ..lights.light import DEFAULT_ILLUMINANCE
+from ..lights.outlined import CollimatedLight
+from ..naming import listed
+from ..optics.glass import Dispersion
+from ..optics.spectrum import illuminant
+from ..scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+from .figures import Stone, stone_of
 
 TABLE = "table"
 AXES = ("z", "-z", "x", "-x", "y", "-y")

@@ -40,7 +40,7 @@ _NEAR = 0.02
 _NAMED = 4
 
 
-def stone_of(path: Path, staging: Staging, notes: list[str]) -> SceneObject:
+def object_of_design(path: Path, staging: Staging, notes: list[str]) -> SceneObject:
     """The stone of the design in a file, table up; what was assumed goes to `notes`. Raises `UserError`."""
     design = read_asc(path)
     mesh = design.mesh(path.stem, str(path))

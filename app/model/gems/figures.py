@@ -17,7 +17,7 @@ import numpy as np
 from ...base.errors import UserError
 from ..geometry.bvh import build_bvh
 from ..geometry.mesh import Mesh
-from .glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
+from ..optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
 
 ASET_HEAD_DEG = 15.0
 """Blue of ASET: within this angle from the viewer, who hides that light; red up to 45°, green to the girdle's plane."""
@@ -141,13 +141,13 @@ def look(
     cancelled: Cancelled | None = None,
     least: float = LEAST,
 ) -> np.ndarray:
-    """Sums (N, COLUMNS) of `gem_paths` for what an eye in the direction `viewer` sees through `places` (N, 3), of light
+    """Sums (N, COLUMNS) of `paths` for what an eye in the direction `viewer` sees through `places` (N, 3), of light
     round `up`.
 
     Rays that meet nothing have sums of 0. By two threads; `cancelled`: the rest stays 0. `least`: shares of light that
     are not followed.
     """
-    from .gem_paths import COLUMNS, room, traced
+    from .paths import COLUMNS, room, traced
 
     out = np.zeros((len(places), COLUMNS))
     n, head = float(stone.glass.index(wavelength_nm)), math.cos(math.radians(head_deg))
@@ -170,7 +170,7 @@ def look(
 
 def beside_head(sums: np.ndarray) -> np.ndarray:
     """What comes from before the stone, beside the head, in light from a whole hemisphere."""
-    from .gem_paths import HIGH, LOW
+    from .paths import HIGH, LOW
 
     return sums[:, HIGH] + sums[:, LOW]
 
@@ -255,7 +255,7 @@ def figures(
     cancelled: Cancelled | None = None,
 ) -> GemFigures | None:
     """Figures of `stone` by `count`² rays, and some more; None where that was `cancelled`. Raises `UserError`."""
-    from . import gem_paths as g
+    from . import paths as g
 
     told, stopped = report or (lambda share, text: None), cancelled or (lambda: False)
     told(0.0, "light return")
@@ -301,7 +301,7 @@ def figures(
 def _weighted(stone: Stone, count: int, stopped: Cancelled) -> float:
     """∫∫ L cos²θ dA dω of all directions above by the light on the crown, ∫∫ dA dω, L what the stone sends there out of
     an even hemisphere of 1 above its table: after Hemphill et al. 1998. By `count` places on the crown."""
-    from . import gem_paths as g
+    from . import paths as g
 
     edges = stone.corners[:, 1:] - stone.corners[:, :1]
     areas = np.where(stone.normals[:, 2] > 1e-6, 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1), 0.0)
