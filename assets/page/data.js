@@ -35,9 +35,8 @@ export async function readData(page) {
   const array = (name) => {
     if (!head.arrays[name]) return null;
     const stored = raw(name), { dtype } = head.arrays[name];
-    if (dtype === "f2") halves ??= halfFloats();
     if (dtype !== "f2" && dtype !== "u2") return stored;
-    return Float32Array.from(stored, dtype === "f2" ? (bits) => halves[bits] : (value) => value / 65535);
+    return Float32Array.from(stored, dtype === "f2" ? (bits) => (halves ??= halfFloats())[bits] : (value) => value / 65535);
   };
   const picture = (name, type) =>
     createImageBitmap(new Blob([raw(name)], { type }), { colorSpaceConversion: "none", premultiplyAlpha: "none" });

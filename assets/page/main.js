@@ -2,7 +2,7 @@
 
 import { readData } from "./data.js";
 import { lackOf, Light } from "./light.js";
-import { bindPanel, bindReading, byId, tell, tellIndex } from "./panel.js";
+import { bindPanel, bindReading, byId, tell, tellIndex, VIEWS } from "./panel.js";
 import { coloursOf, drawIndex, drawSpectrum, nmUnder } from "./plots.js";
 import { lampSpectrum, spectrumAt } from "./probe.js";
 import { beamRows, photonRows } from "./records.js";
@@ -11,7 +11,6 @@ import { areaAt, around, fromAbove, fromCamera, inverse, uvAt } from "./views.js
 
 const SLOW_MS = 100, FAST_MS = 25, SETTLED_MS = 180, WIDEST = 4, COARSEST = 16;
 const LIGHT = ["rows", "gain", "spectrum", "nm", "isSingle"], SEEN = ["space", "view", "above"];
-const MODES = { camera: 0, above: 1, space: 2 };
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 
 function problem(text) {
@@ -92,7 +91,7 @@ async function start() {
     toUv = camera.toUv;
     if (camera.eye && dirty.glass) light.drawGlass(camera, width, height);
     if (dirty.map) light.gather(toUv, width, height, Math.min(step, WIDEST), Math.max(step / WIDEST, 1) ** 2);
-    light.show(MODES[state.view], head.exposure_ev + state.exposure, markPixel(), width, height);
+    light.show(VIEWS.indexOf(state.view), head.exposure_ev + state.exposure, markPixel(), width, height);
     tell(state, shown.index);
     if (shown.index.length) {
       const own = glass(head.groups[0].row);

@@ -3,7 +3,7 @@
 import { abbeNumber, LAST_NM, FIRST_NM, valueAt } from "./spectra.js";
 
 export const byId = (id) => document.getElementById(id);
-const VIEWS = ["camera", "above", "space"];
+export const VIEWS = ["camera", "above", "space"];
 
 // Binds the page: `set(changes)` takes what the reader wants, `act` has step, reset, save, play(what).
 export function bindPanel(head, state, set, act) {
@@ -11,11 +11,9 @@ export function bindPanel(head, state, set, act) {
     element.addEventListener("input", () => set({ ...changes(element), playing: null }));
   document.querySelectorAll("#glasses select").forEach((select, g) =>
     onInput(select, ({ value }) => ({ rows: state.rows.with(g, Number(value)) })));
-  onInput(byId("gain"), ({ value }) => ({ gain: Number(value) }));
-  onInput(byId("spectrum"), ({ value }) => ({ spectrum: Number(value) }));
+  for (const id of ["gain", "spectrum", "exposure"]) onInput(byId(id), ({ value }) => ({ [id]: Number(value) }));
   onInput(byId("single"), ({ checked }) => ({ isSingle: checked }));
   onInput(byId("nm"), ({ value }) => ({ nm: Number(value), isSingle: true }));
-  onInput(byId("exposure"), ({ value }) => ({ exposure: Number(value) }));
   for (const view of VIEWS) byId(`view-${view}`).addEventListener("click", () => set({ view }));
   for (const what of ["gain", "nm"]) byId(`${what}-play`).addEventListener("click", () => act.play(what));
   for (const what of ["reset", "save"]) byId(what).addEventListener("click", act[what]);
@@ -30,8 +28,7 @@ function bindSteps(steps, act) {
     byId("step-count").textContent = `${now + 1} of ${steps.length}`;
     act.step(steps[now].set);
   };
-  byId("back").addEventListener("click", () => go(-1));
-  byId("next").addEventListener("click", () => go(1));
+  for (const [id, by] of [["back", -1], ["next", 1]]) byId(id).addEventListener("click", () => go(by));
   byId("steps").hidden = false;
   go(0);
 }

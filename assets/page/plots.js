@@ -50,9 +50,8 @@ function reading({ pen, width, height }, nm, y) {
 // n(λ) in colours, with the scene's own glass as a thin line; `nm`: where it is read.
 export function drawIndex(canvas, shown, own, nm, colours) {
   const plot = begin(canvas), { pen, width, height } = plot, floor = height - BOTTOM;
-  let low = Math.min(...shown, ...own), high = Math.max(...shown, ...own);
-  const margin = Math.max(0.08 * (high - low), 0.002);
-  [low, high] = [low - margin, high + margin];
+  const least = Math.min(...shown, ...own), most = Math.max(...shown, ...own);
+  const margin = Math.max(0.08 * (most - least), 0.002), low = least - margin, high = most + margin;
   const up = (n) => floor - ((n - low) / (high - low)) * (floor - TOP);
   pen.textAlign = "right";
   pen.globalAlpha = 0.7;

@@ -17,9 +17,8 @@ export function indexOf(glass, gain) {
 }
 
 // (n_d - 1) / (n_F - n_C).
-export function abbeNumber(glass) {
-  return (valueAt(glass, D_NM) - 1) / (valueAt(glass, 486.1327) - valueAt(glass, 656.2725));
-}
+export const abbeNumber = (glass) =>
+  (valueAt(glass, D_NM) - 1) / (valueAt(glass, 486.1327) - valueAt(glass, 656.2725));
 
 // x of every nanometre, and whether all of it was traced. `nm`: the wavelength at equal steps of x, where x is not affine
 // in the index.
@@ -39,8 +38,7 @@ export function scaled({ density, lines }, scale) {
 
 // A single wavelength in place of a spectrum: what 10 nm of an even one as bright would have there.
 export function single(nm, spectrum) {
-  let power = spectrum.lines.reduce((sum, [, watts]) => sum + watts, 0);
-  for (const watts of spectrum.density) power += watts;
+  const power = [...spectrum.density, ...spectrum.lines.map(([, watts]) => watts)].reduce((sum, watts) => sum + watts);
   return { density: new Float32Array(COUNT), lines: [[nm, power / 12]] };
 }
 

@@ -2,7 +2,6 @@
 // down, 1) to (u, v, 1) times a weight.
 
 const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const minus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const mul = (a, k) => a.map((x) => k * x);
 const plus = (a, b, k) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -20,15 +19,12 @@ export function inverse([a, b, c, d, e, f, g, h, i]) {
 }
 
 // Area on the receiver of the pixel at a place.
-export function areaAt([a, b, c, d, e, f, g, h, i], [px, py]) {
-  return Math.abs(dot([a, b, c], cross([d, e, f], [g, h, i])) / (g * px + h * py + i) ** 3);
-}
+export const areaAt = ([a, b, c, d, e, f, g, h, i], [px, py]) =>
+  Math.abs(dot([a, b, c], cross([d, e, f], [g, h, i])) / (g * px + h * py + i) ** 3);
 
 // The scene's own camera, on a canvas of another size.
-export function fromCamera(head, width, height) {
-  const kx = head.camera.width / width, ky = head.camera.height / height, m = head.camera.pixel_to_uv.flat();
-  return m.map((value, i) => value * [kx, ky, 1][i % 3]);
-}
+export const fromCamera = ({ camera }, width, height) =>
+  camera.pixel_to_uv.flat().map((value, i) => value * [camera.width / width, camera.height / height, 1][i % 3]);
 
 // Straight from above: `centre` (u, v), units across the canvas' smaller side.
 export function fromAbove({ centre, across }, width, height) {
@@ -46,7 +42,7 @@ export function around({ plane }, { target, axes: [side, ahead, up], turn, lift,
   const k = (2 * Math.tan(HALF_ANGLE)) / Math.min(width, height);
   const corner = plus(plus(mul(back, -1), right, (-k * width) / 2), over, (k * height) / 2);
   const columns = [mul(right, k), mul(over, -k), corner];
-  const normal = cross(plane.u, plane.v), from = minus(eye, plane.origin), tall = -dot(from, normal);
+  const normal = cross(plane.u, plane.v), from = plus(eye, plane.origin, -1), tall = -dot(from, normal);
   const rows = [plane.u, plane.v].map((axis) => plus(mul(normal, dot(from, axis)), axis, tall)).concat([normal]);
   const toUv = rows.flatMap((row) => columns.map((column) => (Math.sign(tall) || 1) * dot(row, column)));
   // Nothing is cut off in front or behind: all depths are the same.
