@@ -135,6 +135,8 @@ def test_the_spectrum_of_a_table_is_still_being_found(gl: Context, busy: Busy, m
         assert said in " ".join(hints)
     busy.answer(gl)
     busy.interface.move(busy.at(SPOT))
-    busy.interface.frame(2)
-    cursor = busy.session.jobs.cursor.view_model
+    for _ in range(100):  # what rests is asked for at intervals
+        busy.interface.frame()
+        if (cursor := busy.session.jobs.cursor.view_model) is not None and cursor.light is not None:
+            break
     assert cursor is not None and cursor.light is not None and cursor.rgb is not None
