@@ -105,6 +105,12 @@ def test_bounds_of_the_panel_lie_within_those_of_the_file(kind: str) -> None:
         assert number.animated is not None
 
 
+@pytest.mark.parametrize("kind", [*LIGHT_KINDS.values(), *MATERIAL_KINDS.values()], ids=lambda kind: kind.kind)
+def test_a_row_says_its_unit_once(kind: type[Light | Material]) -> None:
+    for number in (part for part in kind.parts if isinstance(part, Number) and part.row is not None and part.unit):
+        assert number.unit not in number.row.format
+
+
 @pytest.mark.parametrize("kind", LIGHT_KINDS)
 def test_a_kind_says_of_itself_what_its_attributes_show(kind: str) -> None:
     light, given = light_of(kind), light_of(kind).given()

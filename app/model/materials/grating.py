@@ -96,7 +96,7 @@ _DEPTH = Number(
         0.0,
         2000.0,
         250.0,
-        "%.0f nm",
+        "%.0f",
         is_slider=True,
     ),
     animated=Animated("Depth of a grating's grooves, nm", 0.0, 2000.0),

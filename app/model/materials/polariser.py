@@ -40,7 +40,7 @@ _RETARDANCE = Number(
         0.0,
         2000.0,
         0.0,
-        "%.1f nm",
+        "%.1f",
         is_slider=True,
     ),
     animated=Animated("How far light across the axis falls behind, nm", -MAX_RETARDANCE_NM, MAX_RETARDANCE_NM),
