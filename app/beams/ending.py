@@ -131,7 +131,8 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     # Where rays graze, and where a cone fades away, there is no end to halving: what is faint is straight enough.
     faint = work.threshold if kind == LEAF_TAIL else FAINT * work.threshold
     power = power_as(beam, beam, tables, work)
-    room = work.top + 2 < len(nodes) and power > faint
+    is_free = work.top + 2 < len(nodes)
+    room = is_free and power > faint
     tolerance = facets[beam.facet].texel if kind == LEAF_RECEIVER else work.tolerance
     bend = 0.0
     if room and not is_parallel and kind == LEAF_RECEIVER:
@@ -155,7 +156,7 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         halve(nodes, 0.5 * (beam.x[0] + beam.x[2]), facets, solids, tables, sources, work)
         return
     crooked = kind == LEAF_RECEIVER and missed > _CROOKED
-    if crooked and is_wide and work.top + 2 < len(nodes):
+    if crooked and is_wide and is_free:
         halve_by_chance(nodes, facets, solids, tables, sources, work)
         return
     row, first = work.count[0], work.count[2]

@@ -96,15 +96,10 @@ def glass_called(text: str, folder: Path, notes: list[str]) -> Dispersion:
 
 def on_table(context: Context, stone: Stone, report: Report, cancelled: Cancelled) -> TableFire:
     """The fire that it throws on a table. Raises `UserError`."""
+    from ..base.generators import finished
     from ..render.gem_fire import table_fire
 
-    steps = table_fire(context, stone, cancelled)
-    while True:
-        try:
-            report(next(steps), "light on the table")
-        except StopIteration as finished:
-            found: TableFire = finished.value
-            return found
+    return finished(table_fire(context, stone, cancelled), lambda share: report(share, "light on the table"))
 
 
 def write(found: GemReport, path: Path, picture: str = "aset") -> None:

@@ -44,16 +44,12 @@ _OF_SOLID = (
 )
 ERROR_RANGE = 0.5
 """Relative error at the ends of the map's scale (`passes.display.ERROR_RANGE`)."""
-_WIDE_EM = 40.0
-"""Width of the panel from which on it has two columns."""
 _LEGEND_STEPS = 40
 
 
 def draw_compare(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
-    # Below the picture it is low and wide: in two columns nothing has to be scrolled to.
-    is_wide = imgui.get_content_region_avail().x >= theme.em(_WIDE_EM)
-    if not imgui.begin_table("##compare", 2 if is_wide else 1, imgui.TableFlags_.sizing_stretch_same):
+    if not widgets.begin_columns("##compare"):
         return state
     imgui.table_next_column()
     state = _controls(state, view_model)

@@ -13,7 +13,6 @@ from ...base.image_io import READ_SUFFIXES
 from ...edit.parameters import paths
 from ...edit.requests import Derive, MatchGlass
 from ...edit.state import State
-from .. import theme
 from ..compared_with import glass_object
 from ..view_model import Found, ViewModel
 from . import file_browser, widgets
@@ -29,13 +28,11 @@ _WANTED_TIPS = {
     "in a .csv, both ends of a line.",
     "width": "Press K and click both ends of a line across the fringe, on the receiver.",
 }
-_WIDE_EM = 40.0
 
 
 def draw_solve(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
-    is_wide = imgui.get_content_region_avail().x >= theme.em(_WIDE_EM)
-    if not imgui.begin_table("##solve", 2 if is_wide else 1, imgui.TableFlags_.sizing_stretch_same):
+    if not widgets.begin_columns("##solve"):
         return state
     imgui.table_next_column()
     state = _derivative(state, view_model)

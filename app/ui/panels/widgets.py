@@ -34,6 +34,8 @@ from .rows import tooltip as tooltip
 Choice = TypeVar("Choice", bound=str)
 
 _PICKER_EM = 15.0
+_WIDE_EM = 40.0
+"""Width of a panel from which on it has two columns."""
 _LARGEST = MAX_MAGNITUDE
 """Numbers beyond could not be saved either."""
 
@@ -339,6 +341,13 @@ def section(title: str, *, is_open: bool = True) -> bool:
     shown = imgui.collapsing_header(title, flags)
     item_rects.note(title)
     return shown
+
+
+def begin_columns(name: str) -> bool:
+    """Begin a table of a panel's two halves, `imgui.end_table` ends it: side by side where the panel is wide. Below the
+    picture it is low and wide, and nothing has to be scrolled to."""
+    is_wide = imgui.get_content_region_avail().x >= theme.em(_WIDE_EM)
+    return imgui.begin_table(name, 2 if is_wide else 1, imgui.TableFlags_.sizing_stretch_same)
 
 
 def hint(text: str) -> None:
