@@ -97,10 +97,29 @@ def test_parts_of_one_solid_are_joined(tmp_path: Path, closed: bool) -> None:
         assert again.mesh.volume() == pytest.approx(1.0 / 6.0) and again.object_to_world[0, 0] == 2.0
 
 
+@pytest.mark.parametrize("factor", [1.0, 0.6, 0.4])
+@pytest.mark.parametrize("faces", [CLOSED, OPEN], ids=["solid", "sheet"])
+def test_iridescence_is_a_film(tmp_path: Path, factor: float, faces: np.ndarray) -> None:
+    """On a solid its thickness can be dragged; a sheet carries it as a coating, being no film itself."""
+    iridescence = {"iridescenceFactor": factor, "iridescenceIor": 1.4, "iridescenceThicknessMaximum": 300.0}
+    values = pbr(1, 1, 1, 1) | through(1, volume={"thicknessFactor": 1}, iridescence=iridescence)
+    material, scene = opened(tmp_path, values, faces)
+    film, told = material.film, [note for note in scene.notes if "ridescence" in note]
+    if factor < 0.5:
+        assert film is None and "not shown" in told[0]
+        return
+    (layer,) = film.layers
+    assert (layer.nm, layer.medium.n_d, film.alone) == (300.0, pytest.approx(1.4), False) and len(told) == (factor < 1)
+    assert material.film_nm == (300.0 if faces is CLOSED else 0.0)
+    save_gltf(scene, tmp_path / "n.glb", original=tmp_path / "m.glb")
+    again = load_gltf(tmp_path / "n.glb").objects[0].material
+    assert again.film == film and again.thin == material.thin
+
+
 NOT_SHOWN: dict[str, dict[str, Any]] = {
     "clearcoat": {"clearcoatFactor": 1.0},
     "sheen": {"sheenColorFactor": [0.1, 0, 0]},
-    "iridescence": {"iridescenceFactor": 0.5},
+    "iridescence": {"iridescenceFactor": 0.4},
     "anisotropy": {"anisotropyStrength": 0.3},
     "diffuse_transmission": {"diffuseTransmissionFactor": 0.2},
     "specular": {"specularFactor": 0.5},

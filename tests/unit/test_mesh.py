@@ -240,6 +240,20 @@ def test_components_of_a_long_chain() -> None:
     assert examine(make_mesh("two", points, order[np.delete(strip, [2499, 2500], axis=0)])).components == 2
 
 
+@pytest.mark.parametrize(("gap", "closes"), [(1e-6, True), (1e-3, False)])
+def test_seam_that_gapes_by_rounding_is_closed(gap: float, closes: bool) -> None:
+    """A sphere of longitudes whose last meets its first but for rounding, as exporters write it."""
+    rings, sides = 8, 12
+    polar, round_it = np.meshgrid(np.linspace(0.0, np.pi, rings), np.linspace(0.0, 2.0 * np.pi + gap, sides + 1))
+    points = np.stack([np.sin(polar) * np.cos(round_it), np.sin(polar) * np.sin(round_it), np.cos(polar)], axis=2)
+    a = np.add.outer(np.arange(sides) * rings, np.arange(rings - 1)).ravel()
+    quads = np.stack([a, a + rings, a + rings + 1, a, a + rings + 1, a + 1], axis=1)
+    mesh, notes = repair(make_mesh("ball", points.reshape(-1, 3), quads.reshape(-1, 3)))
+    assert mesh.is_closed == closes and any("open" in note for note in notes) != closes
+    if closes:
+        assert abs(mesh.volume()) == pytest.approx(3.6, abs=0.3)
+
+
 def test_weld_is_exact() -> None:
     rows = np.array([(0.0, 1.0, 2.0), (-0.0, 1.0, 2.0), (np.nextafter(0.0, 1.0), 1.0, 2.0), (2.0, 1.0, 0.0)])
     kept, number = weld_map(rows)

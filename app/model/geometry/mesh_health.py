@@ -17,9 +17,8 @@ from .mesh import Mesh, make_mesh
 _DEGENERATE = 1e-12
 """A triangle is degenerate when twice its area is below this fraction of its longest edge squared."""
 
-
 _SEAM = 1e-5
-"""Share of a mesh's longest side: corners nearer than this are one where `forms_of` looks for what is enclosed."""
+"""Share of a mesh's longest side: corners of borders that are nearer than this are one."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +102,29 @@ def weld_map(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first[rank], place[inverse.reshape(-1)]
 
 
+def seam_map(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As `weld_map` of positions (V, 3); borders of `triangles` (T, 3) that lie on each other but for rounding are
+    merged too."""
+    kept, number = weld_map(vertices)
+    edges, uses = _edges(number[triangles])
+    border = np.unique(edges[:, uses == 1])
+    if len(border):
+        from scipy.spatial import cKDTree
+
+        reach = _SEAM * float(np.ptp(vertices, axis=0).max())
+        near = border[cKDTree(vertices[kept][border]).query_pairs(reach, output_type="ndarray")]
+        used, place = np.unique(connected_roots(near[:, 0], near[:, 1], len(kept)), return_inverse=True)
+        kept, number = kept[used], place[number]
+    return kept, number
+
+
+def _edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The edges of triangles (T, 3) by vertex number, int (2, E), and how many triangles use each (E,)."""
+    ends = np.sort(np.stack([triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()]), axis=0)
+    edges, uses = np.unique(ends[:, ends[0] != ends[1]], axis=1, return_counts=True)
+    return edges, uses
+
+
 def half_edges(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which half-edges 3 t + i (corner i to i + 1 of triangle t) lie on one edge: `order` (3 T,) with those of one edge
     in a row, `same` (3 T - 1,), where one is on the edge of the one before it; and vertices (T, 3), those at one
@@ -152,17 +174,17 @@ def examine(mesh: Mesh) -> MeshHealth:
 def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> tuple[Mesh, tuple[str, ...]]:
     """Mend what can be mended without a guess, and say in one sentence each what was done or assumed.
 
-    Welds vertices at equal positions, drops triangles without area, turns an inside-out
-    solid, and replaces zero shading normals by the face's. Open, non-manifold and
-    inconsistently wound meshes are kept, with a warning where the mesh is to be `solid` (a
-    table may well be open). Raises UserError when nothing but degenerate triangles is left.
+    Welds vertices at equal positions and seams that gape by rounding, drops triangles without area, turns an
+    inside-out solid, and replaces zero shading normals by the face's. Open, non-manifold and inconsistently wound
+    meshes are kept, with a warning where the mesh is to be `solid` (a table may well be open). Raises UserError when
+    nothing but degenerate triangles is left.
     """
     health = health or examine(mesh)
     notes: list[str] = []
     label = f"mesh '{mesh.name}'"
-    if health.duplicate_vertices:
+    if health.duplicate_vertices or health.boundary_edges:
         # No note: exporters split vertices for normals and texture coordinates as a matter of course.
-        kept, number = weld_map(mesh.vertices)
+        kept, number = seam_map(mesh.vertices, mesh.triangles)
         mesh = replace(mesh, vertices=mesh.vertices[kept], triangles=number[mesh.triangles].astype(np.int32))
         health = examine(mesh)
     if health.degenerate_triangles:
@@ -219,11 +241,9 @@ def _is_open(meshes: Sequence[Mesh]) -> bool:
     """Whether borders are long for the area: of more than gaps."""
     sizes = np.cumsum([0] + [len(mesh.vertices) for mesh in meshes])
     vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    # Seams whose corners differ by rounding are closed.
-    kept, number = weld_map(np.round(vertices / (_SEAM * float(np.ptp(vertices, axis=0).max()) or 1.0)))
-    corners = np.concatenate([number[mesh.triangles + first] for mesh, first in zip(meshes, sizes, strict=False)])
-    ends = np.sort(np.stack([corners.ravel(), np.roll(corners, -1, axis=1).ravel()]), axis=0)
-    edges, uses = np.unique(ends, axis=1, return_counts=True)
+    triangles = np.concatenate([mesh.triangles + first for mesh, first in zip(meshes, sizes, strict=False)])
+    kept, number = seam_map(vertices, triangles)
+    edges, uses = _edges(number[triangles])
     border = float(np.linalg.norm(np.subtract(*vertices[kept][edges[:, uses == 1]]), axis=1).sum())
     return border**2 > float(sum(mesh.areas().sum() for mesh in meshes))
 

@@ -1,10 +1,10 @@
 """glTF materials to ours and back, and what glTF has no words for, kept under `extras.spectrasplat`.
 
 A scene file's own words there win over everything: `glass` names a catalogue glass, `material` is a whole material
-table. Without them transmission, ior, dispersion and volume make a glass that the base colour filters, what is blended
-by a small alpha thin glass, a smooth metal a mirror, and the base colour anything else a diffuse surface, with a coat
-where that is smooth. The extras of nodes hold the brush's dabs, those of the file what lies behind everything and
-render defaults; those of lights are in `gltf`. Other programs' extras are left alone.
+table. Without them transmission, ior, dispersion and volume make a glass that the base colour filters, iridescence a
+film on it; what is blended by a small alpha is thin glass, a smooth metal a mirror, and the base colour makes anything
+else a diffuse surface, with a coat where that is smooth. The extras of nodes hold the brush's dabs, those of the file
+what lies behind everything and render defaults; those of lights are in `gltf`. Other programs' extras are left alone.
 """
 
 from __future__ import annotations
@@ -18,10 +18,12 @@ import numpy as np
 
 from ..fields import write_fields
 from ..local_dispersion import DABS, describe_dabs, read_dabs
+from ..materials.coating import FILM_INDEX, Coating
 from ..materials.diffuse import USUAL_COAT_INDEX, read_finish
 from ..materials.material_file import read_material
 from ..naming import Unshown
 from ..optics import catalogue, glass
+from ..optics.thin_films import MAX_NM, Film, Layer
 from ..scene import Absorption, Dab, Dielectric, Diffuse, Material, Mirror, RenderDefaults, Scene
 from ..scene_environment import ENVIRONMENT, environment_values, read_environment
 from ..scene_render import read_render, render_values
@@ -31,9 +33,9 @@ from .gltf_document import GltfDocument
 from .gltf_textures import GltfTextures
 from .scene_table import SceneTable
 
-TRANSMISSION, VOLUME, IOR, DISPERSION = (f"KHR_materials_{n}" for n in ("transmission", "volume", "ior", "dispersion"))
+_GLASS_EXTENSIONS = tuple(f"KHR_materials_{n}" for n in ("transmission", "volume", "ior", "dispersion", "iridescence"))
+TRANSMISSION, VOLUME, IOR, DISPERSION, IRIDESCENCE = _GLASS_EXTENSIONS
 EXTRAS = "spectrasplat"
-_GLASS_EXTENSIONS = (TRANSMISSION, VOLUME, IOR, DISPERSION)
 _MIRROR_ROUGHNESS = 0.2
 _COAT_ROUGHNESS = 0.5
 """From here on what a dielectric reflects is a faint sheen, which is left out: 0.5 is what modellers give to all."""
@@ -111,7 +113,7 @@ def _material(values: dict[str, Any], name: str, where: str, unshown: Unshown) -
             "(--glass makes an object solid)",
             name,
         )
-        return _glass(values, name, where, vec3(1.0 - alpha * (1.0 - c) for c in rgb), unshown).changed(thin=True)
+        return _sheet(_glass(values, name, where, vec3(1.0 - alpha * (1.0 - c) for c in rgb), unshown))
     elif blends and (alpha < 1.0 or _BASE_COLOUR in pbr):
         unshown.add("Alpha-blended materials are shown opaque", name)
     # A file that says nothing has metal of roughness 1 by glTF's defaults.
@@ -148,7 +150,7 @@ def _note_unshown(values: dict[str, Any], material: Material, name: str, unshown
     extensions = values.get("extensions", {})
     for short, (words, keys) in _NOT_SHOWN.items():
         given = extensions.get(f"KHR_materials_{short}")
-        if given is None:
+        if given is None or (short == "iridescence" and getattr(material, "film", None) is not None):
             continue
         if not keys or any(np.any(np.subtract(given[key], _NEUTRAL.get(key, 0.0))) for key in keys if key in given):
             unshown.add(f"{words} not shown (KHR_materials_{short})", name)
@@ -182,7 +184,35 @@ def _glass(values: dict[str, Any], name: str, where: str, rgb: Vec3, unshown: Un
     if given is None and values.get("alphaMode") != "BLEND":
         unshown.add("Glass without a roughnessFactor is taken as polished instead of fully rough", name)
     roughness = min(1.0, max(0.0, float(given or 0.0)))
-    return Dielectric(dispersion, _absorption(extensions, where), roughness=roughness, transmittance_rgb=rgb)
+    film_index, film_nm = _film(extensions.get(IRIDESCENCE, {}), name, unshown)
+    return Dielectric(
+        dispersion,
+        _absorption(extensions, where),
+        roughness=roughness,
+        transmittance_rgb=rgb,
+        film_nm=film_nm,
+        film_index=film_index,
+    )
+
+
+def _film(iridescence: Mapping[str, Any], name: str, unshown: Unshown) -> tuple[float, float]:
+    """Index and thickness (nm) of what makes glass iridescent: all of it from one half of its factor on, else none."""
+    factor = float(iridescence.get("iridescenceFactor", 0.0))
+    if factor < 0.5:
+        return FILM_INDEX.default, 0.0
+    if factor < 1.0:
+        unshown.add("Iridescence of a factor below 1 is taken as whole", name)
+    index = float(iridescence.get("iridescenceIor", 1.3))
+    thickness = float(iridescence.get("iridescenceThicknessMaximum", 400.0))
+    return min(max(index, 1.0), 5.0), min(max(thickness, 0.0), MAX_NM)
+
+
+def _sheet(material: Dielectric, **changes: Any) -> Dielectric:
+    """A thin one. A film becomes a coating: `film_nm` would make the sheet itself the film."""
+    if material.film_nm > 0.0:
+        coating = Coating(Film((Layer(glass.constant(material.film_index), material.film_nm),)))
+        changes |= {"coating": coating, "film_nm": 0.0}
+    return material.changed(thin=True, **changes)
 
 
 def formed(document: GltfDocument, index: int, material: Material, is_sheet: bool, unshown: Unshown) -> Material:
@@ -196,14 +226,14 @@ def formed(document: GltfDocument, index: int, material: Material, is_sheet: boo
     thickness = float(volume.get("thicknessFactor", 0.0))
     if not is_sheet and thickness == 0.0:
         unshown.add("Closed meshes of glass that glTF calls thin-walled (no thicknessFactor) are solid", name)
-    if not is_sheet:
+    if not is_sheet or not isinstance(material, Dielectric):
         return material
     if thickness > 0.0:
         unshown.add("Glass with a thickness on an open mesh is taken as a thin sheet", name)
     depth = thickness / float(volume.get("attenuationDistance", math.inf))
     within = (float(c) ** depth for c in volume.get("attenuationColor", (1.0, 1.0, 1.0)))
     rgb = vec3(c * w for c, w in zip(material.transmittance_rgb, within, strict=True))
-    return material.changed(thin=True, absorption=None, transmittance_rgb=rgb)
+    return _sheet(material, absorption=None, transmittance_rgb=rgb)
 
 
 def _absorption(extensions: dict[str, Any], where: str) -> Absorption | None:
@@ -276,6 +306,9 @@ def _glass_extensions(material: Dielectric, thickness: float) -> dict[str, Any]:
     # The extension knows normal dispersion only.
     if dispersion.is_dispersive and dispersion.V_d > 0.0:
         extensions[DISPERSION] = {"dispersion": glass.abbe_to_gltf_dispersion(dispersion.V_d)}
+    if material.film_nm > 0.0:
+        thickness_nm = {f"iridescenceThickness{end}": material.film_nm for end in ("Minimum", "Maximum")}
+        extensions[IRIDESCENCE] = {"iridescenceFactor": 1.0, "iridescenceIor": material.film_index, **thickness_nm}
     return extensions
 
 
