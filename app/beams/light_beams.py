@@ -99,7 +99,7 @@ class BeamFinder:
         ]
 
     def _is_thin(self, light: Light) -> bool:
-        """Whether a parallel light is too thin for float32 to draw what its beams cast: photons carry it."""
+        """Whether a parallel light is too thin for its beams to be told apart from nothing: photons carry it."""
         return light.has_place and min(light.half_extent) * self._unit < _THINNEST
 
     def find(
@@ -197,7 +197,7 @@ _TOGETHER = 10_000
 """Leaves, about, of an extended light's points that are converted at once."""
 _TOLERANCE = 0.25
 """Texels."""
-_THINNEST = 1e-3
+_THINNEST = 1e-6
 """GPU units."""
 
 

@@ -1,7 +1,7 @@
 """Beam polygons in texels of one window, as the shaders read them: records, edges and the hulls to fill.
 
 Everything is relative to a whole texel near the polygon, so that float32 resolves a polygon of a hundredth of a texel
-at the far end of a wide map."""
+at the far end of a wide map; smaller ones are drawn larger, with the same light."""
 
 from __future__ import annotations
 
@@ -67,6 +67,9 @@ LEAST_KEPT = 0.25
 """Least share of a narrow polygon's light that one mask keeps: about half of what is at a mask is inside."""
 BROAD = 4.0
 """Texels that a penumbra keeps at least where it is drawn in a map of wider ones."""
+LEAST_SIZE = 1.0 / 32.0
+"""Texels from a polygon's middle to its edges that it is drawn with at least: of much smaller ones float32 cannot tell
+the area."""
 
 
 @dataclass(frozen=True)
@@ -195,6 +198,8 @@ def packed(
     lines, moves = _lines(ends, inverse, anchor[owner], weight[owner], is_line[owner], 0.5 * diagonal[owner])
     motion = np.maximum.reduceat(moves, first)
     area = polygons.area[chosen] * to_texels.density(polygons.centre[chosen])
+    growth = _grow_tiny(lines, first, owner, area)
+    area *= growth**2
     width = area / np.maximum(diagonal - motion, np.sqrt(area) + 1e-9)
     windows, widest = _windows(lines, first, owner, width)
     kept = _kept_by_masks(lines, ends, first, owner, widest, hulls, hull_first, anchor)
@@ -213,7 +218,7 @@ def packed(
     parabola = np.stack([start, -3.0 * start + 4.0 * middle - end, 2.0 * (start - 2.0 * middle + end)], axis=1)
     records["anchor"], records["slope"] = anchor, level_rows[:, :2] / (level * at_anchor)[:, None]
     records["perspective"] = r[:2] / at_anchor[:, None]
-    records["density"] = parabola * (energy_scale * level / (kept * at_anchor**3))[:, None]
+    records["density"] = parabola * (energy_scale * level / (kept * growth**2 * at_anchor**3))[:, None]
     motion = motion / widest
     nodes = np.ceil(motion / np.clip(0.25 * width / widest, FINEST_STEP, WIDEST_STEP))
     records["nodes"] = np.where(
@@ -243,7 +248,7 @@ def packed(
             int(kind // 2),
             bool(kind % 2),
             data.reshape(-1, per_row, texels, 4),
-            *_filled(*_rows_of(hulls, hull_first, of_kind), widest[of_kind]),
+            *_filled(*_rows_of(hulls, hull_first, of_kind), (widest + 4.0 * LEAST_SIZE * (growth > 1.0))[of_kind]),
         )
 
 
@@ -274,6 +279,20 @@ def _lines(
     lines[is_line, 1] = lines[is_line, 0]
     change = lines[:, 1] - lines[:, 0]
     return lines, np.abs(change[:, 2]) + np.linalg.norm(change[:, :2], axis=1) * radius
+
+
+def _grow_tiny(lines: np.ndarray, first: np.ndarray, owner: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Move the `lines` (E, 2 ends, 4) of polygons that are tiny in every direction apart; how many times (n,) those are
+    longer and wider then. Each grows about the point that is nearest to all its lines, at either end."""
+    a, c = lines[..., :2], lines[..., 2]
+    normal = np.add.reduceat(a[..., :, None] * a[..., None, :], first) + 1e-9 * np.eye(2)
+    middle = np.linalg.solve(normal, -np.add.reduceat(a * c[..., None], first)[..., None])[..., 0]
+    inside = np.sum(a * middle[owner], axis=-1) + c
+    reach = np.maximum(np.maximum.reduceat(inside.max(axis=1), first), 1e-30)
+    # A sliver's lines are all near to its middle, not its corners.
+    growth = np.maximum(LEAST_SIZE / np.maximum(reach, area / (np.pi * reach)), 1.0)
+    lines[..., 2] += (growth[owner, None] - 1.0) * inside
+    return growth
 
 
 def _windows_as_they_are(
