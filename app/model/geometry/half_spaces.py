@@ -1,13 +1,11 @@
 """A convex solid from its planes: what faceting designs are made of.
 
-The face on a plane is the part of it that all other half-spaces leave, cut in the plane's own two coordinates. Planes
-that meet in one point only as far as a file's decimals say get one vertex there, so that the mesh is watertight by
-index.
+Planes that meet in one point only as far as a file's decimals say get one vertex there, so that the mesh is watertight
+by index.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -17,13 +15,9 @@ from .mesh_health import connected_roots
 
 _WIDEST = 1e4
 """A solid that reaches beyond this many times its planes' distances is open."""
-_SAME = 1e-9
+_THINNEST = 1e-9
 _WELD = 1e-8
 """Vertices closer than this share of the solid's size are one."""
-_AT_ONCE = 256
-
-Line = tuple[float, float, float]
-"""a x + b y <= c, (a, b) a unit vector."""
 
 
 def faces_of(planes: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -32,21 +26,56 @@ def faces_of(planes: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
 
     Raises ValueError with a reason where the half-spaces leave nothing, or something open.
     """
+    from scipy.optimize import linprog
+    from scipy.spatial import HalfspaceIntersection, QhullError
+
     planes = np.asarray(planes, dtype=np.float64)
-    scale = float(np.abs(planes[:, 3]).max(initial=0.0))
+    normals, scale = planes[:, :3], float(np.abs(planes[:, 3]).max(initial=0.0))
     if scale == 0.0:
         raise ValueError("all planes go through one point")
-    corners = [_face(planes, number, scale) for number in range(len(planes))]
-    points = np.concatenate([np.zeros((0, 3)), *corners])
-    if sum(len(face) > 0 for face in corners) < 4:
+    distances = planes[:, 3] / scale
+    # The largest ball that fits, of a radius up to 1.
+    rows = np.column_stack([normals, np.ones(len(planes))])
+    ball = linprog((0.0, 0.0, 0.0, -1.0), rows, distances, bounds=[(-_WIDEST, _WIDEST)] * 3 + [(0.0, 1.0)])
+    if not ball.success or ball.x[3] < _THINNEST:
         raise ValueError("they leave nothing of the solid")
-    of_face = np.repeat(np.arange(len(planes)), [len(face) for face in corners])
-    vertices, number = _welded(points, of_face, planes)
-    faces = []
-    for part in np.split(number, np.cumsum([len(face) for face in corners])[:-1]):
-        face = part[part != np.roll(part, 1)]
-        faces.append(face if len(face) > 2 else face[:0])
-    return vertices, faces
+    try:
+        hull = HalfspaceIntersection(np.column_stack([normals, -distances]), ball.x[:3])
+    except QhullError:
+        raise ValueError("they do not close: it has no end on one side") from None
+    if hull.dual_equations[:, 3].max() > -1.0 / _WIDEST:
+        raise ValueError("they do not close: it has no end on one side")
+    vertices, on = _welded(hull.intersections, hull.dual_facets, normals, distances)
+    return scale * vertices, [
+        _corners(normal, vertices, np.flatnonzero(here)) for normal, here in zip(normals, on.T, strict=True)
+    ]
+
+
+def _welded(
+    points: np.ndarray, met: list[list[int]], normals: np.ndarray, distances: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices, float64 (V, 3), and which planes go through each, bool (V, P), of `points` in which planes `met`; where
+    they meet in several points that are nearly one, the point that is nearest to all of them."""
+    from scipy.spatial import cKDTree
+
+    pairs = cKDTree(points).query_pairs(_WELD * float(np.ptp(points, axis=0).max()), output_type="ndarray")
+    roots, number = np.unique(connected_roots(pairs[:, 0], pairs[:, 1], len(points)), return_inverse=True)
+    on = np.zeros((len(roots), len(normals)), bool)
+    for vertex, through in zip(number, met, strict=True):
+        on[vertex, through] = True
+    vertices = points[roots]
+    for vertex, through in zip(vertices, on, strict=True):
+        vertex += np.linalg.lstsq(normals[through], distances[through] - normals[through] @ vertex, rcond=1e-6)[0]
+    return vertices, on
+
+
+def _corners(normal: np.ndarray, vertices: np.ndarray, face: np.ndarray) -> np.ndarray:
+    """The vertices `face` of a plane in their order round it."""
+    if len(face) < 3:
+        return face[:0]
+    spread = vertices[face] - vertices[face].mean(axis=0)
+    u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    return face[np.argsort(np.arctan2(spread @ np.cross(normal, u), spread @ u))]
 
 
 def convex_solid(name: str, planes: np.ndarray, source: str | None = None) -> Mesh:
@@ -74,102 +103,3 @@ def _fan(vertices: np.ndarray, face: np.ndarray, number: np.ndarray) -> list[tup
             best = least, np.roll(number, -turn)
     apex, *others = best[1].tolist()
     return [(apex, a, b) for a, b in pairwise(others)]
-
-
-def _face(planes: np.ndarray, number: int, scale: float) -> np.ndarray:
-    """Corners of the face on one plane, float64 (n, 3). Raises ValueError where it is open."""
-    normal, distance = planes[number, :3], planes[number, 3]
-    lines = _lines_on(planes, number, scale)
-    if lines is None:
-        return np.zeros((0, 3))
-    u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    u /= np.linalg.norm(u)
-    v = np.cross(normal, u)
-    across = lines[:, :3] @ np.column_stack([u, v])
-    length = np.linalg.norm(across, axis=1)
-    rows = np.column_stack([across, lines[:, 3]]) / length[:, None]
-    corners = _polygon([(a, b, c) for a, b, c in rows[np.argsort(rows[:, 2], kind="stable")].tolist()], scale)
-    return distance * normal + np.array(corners).reshape(-1, 2) @ np.stack([u, v])
-
-
-def _lines_on(planes: np.ndarray, number: int, scale: float) -> np.ndarray | None:
-    """Where the other planes cut the plane `number`: rows (n, c) of n·p <= c for p from its point nearest the origin;
-    None where one covers it."""
-    normal, distance = planes[number, :3], planes[number, 3]
-    others = np.delete(planes, number, axis=0)
-    cosine = others[:, :3] @ normal
-    left = others[:, 3] - cosine * distance
-    across = others[:, :3] - cosine[:, None] * normal
-    parallel = np.linalg.norm(across, axis=1) < _SAME
-    behind = left < _SAME * scale * np.where(
-        np.arange(len(others)) < number, 1.0, -1.0
-    )  # the first of equal ones stays
-    if (parallel & behind & (cosine > 0.0)).any() or (parallel & (left < 0.0) & (cosine < 0.0)).any():
-        return None
-    return np.column_stack([across, left])[~parallel]
-
-
-def _polygon(lines: Sequence[Line], scale: float) -> list[tuple[float, float]]:
-    """Corners of the polygon within `lines`, which are in the order of c; none where it has no area."""
-    reach = _WIDEST * scale
-    sides: list[Line | None] = [None] * 4
-    corners = [(-reach, -reach), (reach, -reach), (reach, reach), (-reach, reach)]
-    for line in lines:
-        a, b, c = line
-        if c > 0.0 and c * c > max(x * x + y * y for x, y in corners):
-            break
-        beyond = [a * x + b * y - c for x, y in corners]
-        if max(beyond) <= 1e-13 * scale:
-            continue
-        if min(beyond) >= -1e-13 * scale:
-            return []
-        corners, sides = _cut(corners, sides, line, beyond)
-    if None in sides:
-        raise ValueError("they do not close: it has no end on one side")
-    return corners
-
-
-def _cut(
-    corners: list[tuple[float, float]], sides: list[Line | None], line: Line, beyond: list[float]
-) -> tuple[list[tuple[float, float]], list[Line | None]]:
-    """The polygon without what lies `beyond` a line; `sides[i]` runs from corner i to the next."""
-    kept: list[tuple[float, float]] = []
-    kept_sides: list[Line | None] = []
-    for i, corner in enumerate(corners):
-        after = (i + 1) % len(corners)
-        if beyond[i] <= 0.0:
-            kept.append(corner)
-            kept_sides.append(sides[i])
-        if (beyond[i] <= 0.0) != (beyond[after] <= 0.0):
-            kept.append(_meeting(sides[i], line, corner, corners[after], beyond[i] / (beyond[i] - beyond[after])))
-            kept_sides.append(line if beyond[i] <= 0.0 else sides[i])
-    return kept, kept_sides
-
-
-def _meeting(
-    side: Line | None, line: Line, start: tuple[float, float], end: tuple[float, float], share: float
-) -> tuple[float, float]:
-    """Where two lines meet; by `share` of the way from `start` to `end` where they are nearly one."""
-    if side is not None:
-        (a, b, c), (d, e, f) = side, line
-        determinant = a * e - b * d
-        if abs(determinant) > 1e-9:
-            return (c * e - b * f) / determinant, (a * f - c * d) / determinant
-    return start[0] + share * (end[0] - start[0]), start[1] + share * (end[1] - start[1])
-
-
-def _welded(points: np.ndarray, of_face: np.ndarray, planes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices, float64 (V, 3), and the number of each of `points`, corners of the faces `of_face`, among them; where
-    planes meet in several points that are nearly one, the point that is nearest to all of them."""
-    size = float(np.ptp(points, axis=0).max())
-    found = [np.zeros((0, 2), int)]
-    for first in range(0, len(points), _AT_ONCE):
-        apart = np.abs(points[first : first + _AT_ONCE, None] - points).max(axis=2)
-        found.append(np.argwhere(apart <= _WELD * size) + (first, 0))
-    pairs = np.concatenate(found)
-    roots, number = np.unique(connected_roots(pairs[:, 0], pairs[:, 1], len(points)), return_inverse=True)
-    vertices = points[roots]
-    for i, vertex in enumerate(vertices):
-        met = planes[np.unique(of_face[number == i])]
-        vertices[i] += np.linalg.lstsq(met[:, :3], met[:, 3] - met[:, :3] @ vertex, rcond=1e-6)[0]
-    return vertices, number
