@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
 from pathlib import Path
 
 from ..base.errors import UserError
-from ..commands.gem import glass_called, on_table, stone_at
+from ..commands.gem import stone_at
 from ..commands.scenes import find_scene
-from ..model.gems.figures import ASET_HEAD_DEG, GemFigures
+from ..model.gems.figures import ASET_HEAD_DEG, Cancelled, GemFigures, Report
 from ..model.gems.in_scene import stone_in
-from ..model.gems.report import GemReport, gem_report
+from ..model.gems.report import GemReport, TableFire, gem_report
+from ..model.optics.index_file import find_glass
 from .device import Cancel, Device, Progress
 from .scene import Scene
 
@@ -39,22 +39,19 @@ def gem(
     """
     if not 0.0 <= head_deg <= 60.0:
         raise UserError(f"head_deg is {head_deg:g}; give an angle from 0 to 60 degrees")
-    made_of = None if glass is None else str(glass)
     if isinstance(source, Scene):
-        found_glass = None if made_of is None else glass_called(made_of, Path(), [])
-        stone = stone_in(source._model, object, found_glass, up)
+        made_of = None if glass is None else find_glass(str(glass), Path(), "glass", [])
+        stone = stone_in(source._model, object, made_of, up)
     else:
-        stone = stone_at(find_scene(os.fspath(source)), object, made_of, up)
-    told, share = progress or (lambda done, text: None), 0.6 if table else 1.0
-    found = gem_report(stone, head_deg, lambda done, text: told(share * done, text), cancel)
+        stone = stone_at(find_scene(os.fspath(source)), object, None if glass is None else str(glass), up)
+
+    def thrown(report: Report, cancelled: Cancelled) -> TableFire:
+        from ..render.gem_fire import table_fire
+
+        with Device() as device:
+            return device.run(lambda context, told, stop: table_fire(context, stone, told, stop), report, cancel)
+
+    found = gem_report(stone, head_deg, progress, cancel, thrown if table else None)
     if found is None:
         raise UserError("it was cancelled before there was a figure")
-    if not table or (cancel is not None and cancel()):
-        return found
-    with Device() as device:
-        thrown = device.run(
-            lambda context, report, stopped: on_table(context, stone, report, stopped),
-            lambda done, text: told(share + 0.4 * done, text),
-            cancel,
-        )
-    return replace(found, table=thrown)
+    return found

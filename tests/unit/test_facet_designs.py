@@ -125,6 +125,7 @@ def test_shipped_designs_are_whole_stones(path: Path) -> None:
         (lambda text: text.replace("g 96", "96").replace("y 4 y\n", "").replace("I 1.54\n", ""), "utf-8"),
         (lambda text: text.replace("24 n P1 48 72 96", "24 n\nP1 48\n 72\n96 n P\nG cut to\ncentre point"), "utf-8"),
         (lambda text: text.replace("P1 48", "Main facet 48 n 7"), "utf-8"),
+        (lambda text: text.replace("24 n P1 48 72 96", "24 48 72 96 n"), "utf-8"),
         (lambda text: text.replace("a 90 ", "A -90.0 ").replace("I 1.54", "i 1.54"), "utf-8"),
         (lambda text: text.replace("a 0 0.3 96 n T", "a -0.0 0.9 n C\na 0 0.3 n T"), "utf-8"),
         (lambda text: text.replace("g 96", "; by hand\ng 96").replace("24 n", "24.0 n"), "utf-8"),

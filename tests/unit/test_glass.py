@@ -129,6 +129,16 @@ def test_gems_have_the_published_dispersion() -> None:
     assert catalogue.find("lead crystal").n_d > 1.545 and "no dispersion" in catalogue.find_entry("jade").note
 
 
+def test_an_index_is_a_glass_with_the_dispersion_of_its_abbe_number(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    from spectrasplat.model.optics.index_file import find_glass
+
+    plain, given = (find_glass(name, tmp_path, "glass", []) for name in ("1.54", "1.5168/64.17"))
+    assert plain.index(LINE_F_NM) == plain.index(LINE_C_NM) == 1.54
+    assert given.n_d == pytest.approx(1.5168) and given.V_d == pytest.approx(64.17, rel=1e-3)
+    with pytest.raises(UserError, match="glass"):
+        find_glass("1.54 a", tmp_path, "glass", [])
+
+
 def test_search_ranks_exact_then_prefix() -> None:
     found = catalogue.search("n-sf6")
     assert found[0].qualified_name == "Schott N-SF6"

@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import NamedTuple, NoReturn, TypeVar
 
 import numpy as np
 
@@ -139,175 +139,146 @@ def read_asc(path: str | os.PathLike[str]) -> FacetDesign:
         text = files.read_any_text(path, _MAX_BYTES)
     except OSError as error:
         raise UserError(f"cannot read the design {path}: {files.reason_of(error)}; give a GemCad .asc file") from error
-    reader = _Reader(path)
-    for number, line in enumerate(text.replace("\0", "").replace("\x1a", "").splitlines(), start=1):
-        if words := line.strip():
-            reader.read(number, words)
-    return reader.design()
+    read: dict[str, list[_Record]] = {key: [] for key in "agyihf"}
+    for record in _records(path, text.replace("\0", "").replace("\x1a", "")):
+        if record.key not in read:
+            record.fail("a preform (p) is not read; turn it into facets in GemCad")
+        if record.key in "gyi" and read[record.key]:
+            record.fail(f"'{record.key}' was given before; leave one of them")
+        read[record.key].append(record)
+    if not read["g"]:
+        raise UserError(f"{path.name}: there is no gear (g); write 'g 96 0.0' in its second line")
+    gear, location = read["g"][0].gear()
+    fold, is_mirrored = read["y"][0].symmetry() if read["y"] else (1, False)
+    tiers = tuple(record.tier(abs(gear)) for record in read["a"])
+    if not 4 <= (count := sum(len(tier.indices) for tier in tiers)) <= MOST_FACETS:
+        raise UserError(f"{path.name}: it has {count} facets; a stone has 4 to {MOST_FACETS}")
+    headers, footers = (tuple(record.words for record in read[key]) for key in "hf")
+    title = next(filter(None, headers), path.stem)
+    n_d = read["i"][0].refractive_index() if read["i"] else None
+    return FacetDesign(title, tiers, gear, location, fold, is_mirrored, n_d, headers, footers)
 
 
-class _Reader:
-    """What was read of a file so far."""
-
-    def __init__(self, path: Path) -> None:
-        self.path, self.line = path, 0
-        self.values: dict[str, Any] = {}
-        self.texts: dict[str, list[str]] = {"h": [], "f": []}
-        self.tiers: list[_OpenTier] = []
-        self.is_begun = False
-
-    def fail(self, words: str) -> NoReturn:
-        raise UserError(f"{self.path.name}, line {self.line}: {words}")
-
-    def read(self, line: int, words: str) -> None:
-        """Take one line that is not blank."""
-        self.line = line
-        if not self.is_begun:
-            if not words.casefold().startswith("gemcad"):
-                self.fail("it does not begin with 'GemCad': it is no faceting design; save one from GemCad as .asc")
-            self.is_begun = True
-        elif not words.startswith(";"):
-            found = _RECORD.match(words)
-            if (
-                found is None
-                or (self.tiers and self.tiers[-1].awaits_name)
-                or (found[1] in "gG" and self.tiers and not _is_number(words[found.end() :]))
-            ):
-                self._go_on(words)
-            else:
-                self._record(found[1].casefold(), words[found.end() :].strip())
-
-    def _record(self, key: str, words: str) -> None:
-        if key in self.texts:
-            self.texts[key].append(words)
-        elif key == "a":
-            self.tiers.append(self._tier(words))
-        elif key == "p":
-            self.fail("a preform (p) is not read; turn it into facets in GemCad")
+def _records(path: Path, text: str) -> list[_Record]:
+    """The records of a file; a tier's has all of its lines."""
+    lines = [line.strip() for line in text.splitlines()]
+    begin = next((i for i, line in enumerate(lines) if line), None)
+    if begin is None:
+        raise UserError(f"{path.name}: the file is empty; save a design from GemCad as .asc")
+    if not lines[begin].casefold().startswith("gemcad"):
+        _Record(path, begin + 1).fail(
+            "it does not begin with 'GemCad': it is no faceting design; save one from GemCad as .asc"
+        )
+    records = [_Record(path, begin + 1)]
+    for number, words in enumerate(lines[begin + 1 :], start=begin + 2):
+        last = records[-1]
+        found = _RECORD.match(words)
+        key, rest = (found[1].casefold(), words[found.end() :]) if found else ("", words)
+        if last.key == "a" and key not in "af" and last.words.split()[-1:] in (["n"], ["N"]):
+            key = ""  # a name that its line had no room for
+        if not words or words.startswith(";"):
+            words = key = ""
+        if key and not (key == "g" and last.key == "a" and not _is_number(rest)):
+            records.append(_Record(path, number, key, rest))
+        elif last.key == "a" or not words:
+            records[-1] = last._replace(words=f"{last.words}\n{words}")
+        elif _is_number(words) and all(record.key != "g" for record in records):
+            records.append(_Record(path, number, "g", words))
         else:
-            if key in self.values:
-                self.fail(f"'{key}' was given before; leave one of them")
-            self.values[key] = {"g": self._gear, "y": self._symmetry, "i": self._index}[key](words)
+            _Record(path, number).fail(f"'{words[:40]}' is not understood; lines begin with g, y, I, H, a or F")
+    return records[1:]
 
-    def _go_on(self, words: str) -> None:
-        """A line without a keyword."""
-        if self.tiers:
-            self.tiers[-1].take(words, self.fail)
-        elif "g" not in self.values and all(_is_number(word) for word in words.split()):
-            self.values["g"] = self._gear(words)
-        else:
-            self.fail(f"'{words[:40]}' is not understood; lines begin with g, y, I, H, a or F")
 
-    def _gear(self, words: str) -> tuple[int, float]:
-        teeth, location = self._numbers(words, "g", 1, 2, (96.0, 0.0))
-        if teeth != int(teeth) or not 3 <= abs(teeth) <= _MOST_TEETH:
-            self.fail(f"a gear has 3 to {_MOST_TEETH} teeth, not {teeth:g}; g 96 0.0 is the usual one")
-        return int(teeth), location
+class _Record(NamedTuple):
+    """A line of a file behind its keyword, and the lines on which it goes on."""
 
-    def _symmetry(self, words: str) -> tuple[int, bool]:
-        flag = next((word for word in words.split()[1:] if word.casefold() in ("y", "n")), "")
-        (fold,) = self._numbers(words.removesuffix(flag), "y", 1, 1, (1.0,))
-        if fold != int(fold) or not 1 <= fold <= _MOST_TEETH:
-            self.fail(f"a symmetry is a whole number from 1, not {fold:g}; y 8 y is that of a round brilliant")
-        return int(fold), flag.casefold() == "y"
+    path: Path
+    line: int
+    key: str = ""
+    words: str = ""
 
-    def _index(self, words: str) -> float:
-        (index,) = self._numbers(words, "I", 1, 1, (1.54,))
-        if not _LEAST_INDEX < index <= _MOST_INDEX:
-            self.fail(f"a refractive index of {index:g} is none of a stone; I 1.54 is that of quartz")
-        return index
+    def fail(self, words: str, lines: int = 0) -> NoReturn:
+        raise UserError(f"{self.path.name}, line {self.line + lines}: {words}")
 
-    def _numbers(self, words: str, key: str, least: int, most: int, usual: tuple[float, ...]) -> list[float]:
-        """What stands behind `key`, filled up from `usual`."""
+    def numbers(self, words: str, least: int, usual: tuple[float, ...]) -> list[float]:
+        """`words` as numbers, `least` at least, filled up from `usual`."""
         found = words.split()
-        if not least <= len(found) <= most or not all(map(_is_number, found)):
+        if not least <= len(found) <= len(usual) or not all(map(_is_number, found)):
+            key = "I" if self.key == "i" else self.key
             example = " ".join(f"{value:g}" for value in usual)
             self.fail(f"'{words[:40]}' behind {key} is not understood; give numbers as in '{key} {example}'")
         return [*map(float, found), *usual[len(found) :]]
 
-    def _tier(self, words: str) -> _OpenTier:
-        values = words.split(maxsplit=2)
-        if len(values) < 2 or not all(map(_is_number, values[:2])):
+    def gear(self) -> tuple[int, float]:
+        """Teeth, and the index at the front."""
+        teeth, location = self.numbers(self.words, 1, (96.0, 0.0))
+        if teeth != int(teeth) or not 3 <= abs(teeth) <= _MOST_TEETH:
+            self.fail(f"a gear has 3 to {_MOST_TEETH} teeth, not {teeth:g}; g 96 0.0 is the usual one")
+        return int(teeth), location
+
+    def symmetry(self) -> tuple[int, bool]:
+        """How many-fold, and whether there is a mirror."""
+        flag = next((word for word in self.words.split()[1:] if word.casefold() in ("y", "n")), "")
+        (fold,) = self.numbers(self.words.strip().removesuffix(flag), 1, (1.0,))
+        if fold != int(fold) or not 1 <= fold <= _MOST_TEETH:
+            self.fail(f"a symmetry is a whole number from 1, not {fold:g}; y 8 y is that of a round brilliant")
+        return int(fold), flag.casefold() == "y"
+
+    def refractive_index(self) -> float:
+        """Of the stone."""
+        (index,) = self.numbers(self.words, 1, (1.54,))
+        if not _LEAST_INDEX < index <= _MOST_INDEX:
+            self.fail(f"a refractive index of {index:g} is none of a stone; I 1.54 is that of quartz")
+        return index
+
+    def tier(self, teeth: int) -> Tier:
+        """Angle and distance, then indices, names behind `n` and, behind `G`, instructions; a table's one facet needs
+        no index."""
+        words = re.findall(r"\n|\S+", self.words)
+        if len(words) < 2 or not all(map(_is_number, words[:2])):
             self.fail("a tier begins with its angle and distance; write it as in 'a 41.5 0.62 96 12 24'")
-        angle, distance = map(float, values[:2])
+        angle, distance = map(float, words[:2])
         if not abs(angle) <= 90.0:
             self.fail(f"an angle of {angle:g}° is none of a facet; angles run from -90 to 90")
         if angle == 0.0 and distance < 0.0:  # how a culet is written
             angle, distance = -0.0, -distance
         if not 0.0 <= distance <= _FURTHEST:
             self.fail(f"a distance of {distance:g} is none of a facet; give one from 0 to {_FURTHEST:g}")
-        tier = _OpenTier(self.line, angle, distance)
-        tier.take("".join(values[2:]), self.fail)
-        return tier
-
-    def design(self) -> FacetDesign:
-        """All of it. Raises `UserError`."""
-        name = self.path.name
-        if not self.is_begun:
-            raise UserError(f"{name}: the file is empty; save a design from GemCad as .asc")
-        if "g" not in self.values:
-            raise UserError(f"{name}: there is no gear (g); write 'g 96 0.0' in its second line")
-        gear, location = self.values["g"]
-        tiers = []
-        for tier in self.tiers:
-            self.line = tier.line
-            if not tier.indices and tier.angle_deg != 0.0:
-                self.fail("a tier without indices has no facets; list them behind its distance")
-            for index in tier.indices:
-                if not abs(index) <= abs(gear):
-                    self.fail(f"index {index:g} is beyond the gear's {abs(gear)} teeth; separate indices by blanks")
-            tiers.append(tier.closed())
-        if not 4 <= sum(len(tier.indices) for tier in tiers) <= MOST_FACETS:
-            raise UserError(
-                f"{name}: it has {sum(len(t.indices) for t in tiers)} facets; a stone has 4 to {MOST_FACETS}"
-            )
-        fold, is_mirrored = self.values.get("y", (1, False))
-        headers, footers = tuple(self.texts["h"]), tuple(self.texts["f"])
-        title = next(filter(None, headers), self.path.stem)
-        n_d = self.values.get("i")
-        return FacetDesign(title, tuple(tiers), gear, location, fold, is_mirrored, n_d, headers, footers)
-
-
-class _OpenTier:
-    """A tier to whose line others may be added."""
-
-    def __init__(self, line: int, angle_deg: float, distance: float) -> None:
-        self.line, self.angle_deg, self.distance = line, angle_deg, distance
-        self.indices: list[float] = []
-        self.names: dict[int, str] = {}
-        """By place among the indices, -1 before the first."""
-        self.instructions: list[str] = []
-        self.awaits_name = self._is_in_name = False
-
-    def take(self, words: str, fail: Callable[[str], NoReturn]) -> None:
-        """Indices, names behind `n` and, behind `G`, instructions."""
-        if self.instructions and words[:1] not in "gG":
-            if all(_is_number(word) for word in words.split()):
-                fail("numbers follow a cutting instruction (G); put a tier's indices before it")
-            self.instructions.append(words)
-            return
-        for word in (words_left := iter(words.split())):
-            place = len(self.indices) - 1
-            if self.awaits_name:
-                self.names[place], self.awaits_name, self._is_in_name = word, False, True
+        indices: list[float] = []
+        names: dict[int, str] = {}
+        lines, instructions = 0, ""
+        awaits_name = is_in_name = False
+        for at, word in enumerate(words[2:], start=3):
+            place = max(len(indices) - 1, 0)
+            if word == "\n":
+                lines += 1
+            elif awaits_name:
+                names[place], awaits_name, is_in_name = word, False, True
             elif word in "nN":
-                self.awaits_name = True
+                awaits_name = True
             elif word in "gG":
-                self.instructions.append(" ".join(words_left))
+                instructions = " ".join(words[at:])
+                break
             elif _is_number(word):
-                self.indices.append(float(word))
-                self._is_in_name = False
-            elif self._is_in_name:
-                self.names[place] += f" {word}"
+                indices.append(float(word))
+                is_in_name = False
+                if not abs(indices[-1]) <= teeth:
+                    self.fail(f"index {word} is beyond the gear's {teeth} teeth; separate indices by blanks", lines)
+            elif is_in_name:
+                names[place] += f" {word}"
             else:
-                fail(f"'{word[:40]}' is no index; write a facet's name behind an n, instructions behind a G")
-
-    def closed(self) -> Tier:
-        """The tier; a table's one facet needs no index."""
-        indices = tuple(self.indices) or (0.0,)
-        names = tuple(self.names.get(i, self.names.get(-1, "") if i == 0 else "") for i in range(len(indices)))
-        instructions = " ".join(filter(None, self.instructions))
-        return Tier(self.angle_deg, self.distance, indices, names if any(names) else (), instructions)
+                self.fail(
+                    f"'{word[:40]}' is no index; write a facet's name behind an n, instructions behind a G", lines
+                )
+        for more, line in enumerate(instructions.split("\n")[1:], start=lines + 1):
+            if line.strip() and all(map(_is_number, line.split())):
+                self.fail("numbers follow a cutting instruction (G); put a tier's indices before it", more)
+        if not indices and angle != 0.0:
+            self.fail("a tier without indices has no facets; list them behind its distance")
+        indices = indices or [0.0]
+        named = tuple(names.get(i, "") for i in range(len(indices)))
+        kept = " ".join(re.sub(r"\n [gG](?= |$)", "", instructions).split())
+        return Tier(angle, distance, tuple(indices), named if any(named) else (), kept)
 
 
 def _is_number(word: str) -> bool:

@@ -81,6 +81,8 @@ def stone_of(mesh: Mesh, glass: Dispersion, notes: tuple[str, ...] = ()) -> Ston
     index = float(glass.index(LINE_D_NM))
     if index <= 1.0:
         raise UserError(f"'{mesh.name}' has an index of {index:g}: a stone in air needs more than 1")
+    if glass.index(LINE_F_NM) == glass.index(LINE_C_NM):
+        notes += ("An index alone has no dispersion, so there is no fire",)
     mesh = mesh if volume > 0.0 else mesh.flipped()
     low, high = mesh.bounds()
     scale = np.eye(4) / (0.5 * float(np.linalg.norm(high - low)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -114,12 +115,19 @@ def gem_report(
     head_deg: float = ASET_HEAD_DEG,
     report: Report | None = None,
     cancelled: Cancelled | None = None,
+    table: Callable[[Report, Cancelled], TableFire | None] | None = None,
 ) -> GemReport | None:
-    """Find out all about `stone`; what is missing where that was `cancelled` is NaN or left out, None: all of it.
+    """Find out all about `stone`, the light that it throws on a `table` too where somebody can make that; what is
+    missing where that was `cancelled` is NaN or left out, None: all of it.
 
     Raises `UserError`.
     """
-    told, stopped = report or (lambda share, text: None), cancelled or (lambda: False)
+    stopped, own = cancelled or (lambda: False), 1.0 if table is None else 0.6
+
+    def told(share: float, text: str, begun: float = 0.0, ends: float = own) -> None:
+        if report is not None:
+            report(begun + share * (ends - begun), text)
+
     found = figures(stone, head_deg, 256, lambda share, text: told(0.2 * share, text), stopped)
     if found is None:
         return None
@@ -137,7 +145,10 @@ def gem_report(
         told(0.3 + 0.2 * i / len(ways), "tilting it")
         curves[:, axis, k] = _tilt(stone, axis, float(TILTS_DEG[k]), head_deg)
     pictures = _pictures(stone, lambda share, text: told(0.5 + 0.5 * share, "pictures"), stopped)
-    return GemReport(stone, found, TILTS_DEG, curves[0], curves[1], curves[2], lines, tuple(by_line), pictures)
+    thrown = None
+    if table is not None and not stopped():
+        thrown = table(lambda share, text: told(share, text, own, 1.0), stopped)
+    return GemReport(stone, found, TILTS_DEG, curves[0], curves[1], curves[2], lines, tuple(by_line), pictures, thrown)
 
 
 def _above(sums: np.ndarray) -> float:

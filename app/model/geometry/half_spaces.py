@@ -61,8 +61,8 @@ def _welded(
     pairs = cKDTree(points).query_pairs(_WELD * float(np.ptp(points, axis=0).max()), output_type="ndarray")
     roots, number = np.unique(connected_roots(pairs[:, 0], pairs[:, 1], len(points)), return_inverse=True)
     on = np.zeros((len(roots), len(normals)), bool)
-    for vertex, through in zip(number, met, strict=True):
-        on[vertex, through] = True
+    for corner, planes in zip(number, met, strict=True):
+        on[corner, planes] = True
     vertices = points[roots]
     for vertex, through in zip(vertices, on, strict=True):
         vertex += np.linalg.lstsq(normals[through], distances[through] - normals[through] @ vertex, rcond=1e-6)[0]

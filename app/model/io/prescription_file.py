@@ -18,7 +18,6 @@ import numpy as np
 
 from ...base import files
 from ...base.errors import UserError, suggestion
-from ..optics import glass as glasses
 from ..optics.glass import Dispersion
 from ..optics.index_file import find_glass
 from ..optics.lens_design import Lens, Surface, paraxial, widest_beam
@@ -254,9 +253,6 @@ def _glass(path: Path, listed: _Listed, makers: Sequence[str], notes: list[str])
         return None
     if name.upper() == "MIRROR":
         _fail(path, listed.line, "mirrors cannot be drawn in a row of lenses; place them as objects of a scene")
-    if found := re.fullmatch(r"(\d\.\d+)(?:\s*[/:]\s*(-?\d+(?:\.\d+)?))?", name):
-        v_d = float(found[2] or 0.0) or math.inf
-        return glasses.from_abbe(float(found[1]), v_d, name, where)
     plain = "".join(filter(str.isalnum, name.casefold()))
     name = _OTHER_NAMES.get(plain, name)
     rest, _, last = name.rpartition("_")  # as in N-BK7_SCHOTT

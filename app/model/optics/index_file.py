@@ -7,6 +7,7 @@ those next to the scene file, then those in the folder `glass` of the user's set
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import re
 from functools import lru_cache
@@ -27,6 +28,7 @@ from .glass import Dispersion
 from .spectrum import rgb_under_white
 
 _NAMES_FILE = re.compile(r"\.(?:agf|ya?ml|csv|txt)(?::|$)", re.IGNORECASE)
+_INDEX = re.compile(r"(\d(?:\.\d*)?)(?:\s*[/:]\s*(-?\d+(?:\.\d+)?))?")
 _MAX_BYTES = 4 << 20
 _OPAQUE_K = 0.01
 """Extinction coefficient from which on a hundredth of a millimetre is black."""
@@ -46,9 +48,12 @@ def names_file(name: str) -> bool:
 
 
 def find_glass(name: str, folder: Path, where: str, notes: list[str]) -> Dispersion:
-    """The glass `name`: of a file, of the program's catalogue, of an AGF file in `folder` or the user's settings."""
+    """The glass `name`: of a file, of the program's catalogue, of an AGF file in `folder` or the user's settings;
+    "1.5168/64.17" is one of that n_d and V_d, "1.5" one without dispersion."""
     if names_file(name):
         return read_index(folder / name, notes)
+    if found := _INDEX.fullmatch(name.strip()):
+        return glass.from_abbe(float(found[1]), float(found[2] or 0.0) or math.inf, name.strip(), where)
     try:
         return catalogue.find(name, where)
     except UserError:
