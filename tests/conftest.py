@@ -10,7 +10,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
 import platformdirs
 import pytest
 
@@ -33,6 +32,10 @@ if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
     # A software renderer takes a thread for every core, and every process would. Set before the driver is loaded.
     os.environ.setdefault("LP_NUM_THREADS", str(max(usable_cores() // int(os.environ["PYTEST_XDIST_WORKER_COUNT"]), 1)))
 
+
+# Products of small matrices on several threads wait for each other far longer than they compute, most of all where
+# processes share the cores: the program does without too. Set before numpy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # What the driver compiled is kept for the next run. Mesa's folder is named for tests that set a cache folder of their
 # own.
@@ -66,6 +69,8 @@ def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
 @pytest.fixture(autouse=True)
 def strict_floating_point() -> Iterator[None]:
     """Overflow, division by zero and NaN are failures, not warnings (underflow is normal)."""
+    import numpy as np
+
     with np.errstate(all="raise", under="ignore"):
         yield
 
