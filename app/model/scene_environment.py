@@ -94,8 +94,7 @@ def read_environment(table: SceneTable) -> tuple[Vec3, Environment | None]:
     """
     if table.one_of(("background", ENVIRONMENT), "what lies behind everything") != ENVIRONMENT:
         return read_background(table), None
-    inner = table.table(ENVIRONMENT)
-    assert inner is not None
+    inner = table.given_table(ENVIRONMENT, '{ file = "room.exr" }')
     kind = inner.choice("kind", tuple(_KINDS))
     make, parts = _KINDS[kind]
     values = {"lights": inner.boolean("lights", True)} | read_fields(parts, inner)

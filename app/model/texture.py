@@ -69,8 +69,7 @@ class TextureReader:
         used."""
         if isinstance(table.raw(key), str):
             return self._checked(table, key, table.existing_file(key, or_part=True), "repeat")
-        inner = table.table(key)
-        assert inner is not None
+        inner = table.given_table(key, '{ file = "wood.png" }')
         wrap = inner.choice("wrap", WRAPS, "repeat")
         texture = self._checked(inner, "file", inner.existing_file("file", or_part=True), wrap)
         inner.finish("a texture")

@@ -98,7 +98,7 @@ def test_one_picture_is_read_once(folder: Path, monkeypatch: pytest.MonkeyPatch)
     [
         ('{ kind = "diffuse", texture = "gone.png" }', "objects[1].material.texture names"),
         ('{ kind = "diffuse", texture = "bare.obj" }', "'.obj' is not a picture format"),
-        ('{ kind = "diffuse", texture = 3 }', "objects[1].material.texture must be a table"),
+        ('{ kind = "diffuse", texture = 3 }', "objects[1].material.texture must be a table such as { file"),
         (
             '{ kind = "diffuse", texture = { file = "poster.png", wrap = "mirror" } }',
             "texture.wrap is 'mirror', which is not known",

@@ -230,11 +230,13 @@ class SceneTable:
 
     def table(self, key: str) -> SceneTable | None:
         """The table under `key`, or None when there is none."""
-        if not self.has(key):
-            return None
-        value = self._values[key]
+        return self.given_table(key) if self.has(key) else None
+
+    def given_table(self, key: str, such_as: str = "") -> SceneTable:
+        """The table under `key`, which is there; `such_as`: one that would do, for who gave something else."""
+        value = self.raw(key)
         if not isinstance(value, dict):
-            self.fail(key, f"must be a table, not {_show(value)}")
+            self.fail(key, f"must be a table{such_as and f' such as {such_as}'}, not {_show(value)}")
         return SceneTable(value, self.file, self.key_path(key), self.notes)
 
     def tables(self, key: str) -> list[SceneTable]:

@@ -55,9 +55,7 @@ class AbsorptionPart(Part):
 def _read_absorption(table: SceneTable) -> Absorption | None:
     if not table.has("absorption"):
         return None
-    inner = table.table("absorption")
-    if inner is None:
-        table.fail("absorption", "must be a table such as {colour = [0.4, 0.9, 0.7], distance = 2.0}")
+    inner = table.given_table("absorption", "{ colour = [0.4, 0.9, 0.7], distance = 2.0 }")
     colour = None
     if inner.has("coefficient"):
         wavelengths = inner.numbers("nm", at_least=2)

@@ -128,8 +128,7 @@ class CoatingPart(Part):
                 known = ", ".join(PRESETS)
                 table.fail("coating", f"'{name}' is unknown{suggestion(name, PRESETS)}; there are {known}")
             return {"coating": preset(name)}
-        inner = table.table("coating")
-        assert inner is not None
+        inner = table.given_table("coating", "{ layers = [{ n = 1.38, nm = 100 }] }")
         key = inner.one_of(("layers", "share"), "the coating")
         if key == "share":
             film = Film((), share=inner.number(key, at_least=0.0, at_most=1.0))

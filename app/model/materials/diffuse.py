@@ -127,9 +127,7 @@ class Diffuse(Material):
             return cls(table.colour("colour", (1.0, 1.0, 1.0)), texture=textures.read(table))
         if key != "reflectance":
             return cls(table.colour("colour", (0.8, 0.8, 0.8)))
-        inner = table.table(key)
-        if inner is None:
-            table.fail(key, "must be a table such as {csv = \"paint.csv\"}; an RGB goes under 'colour'")
+        inner = table.given_table(key, "{ csv = \"paint.csv\" } (an RGB goes under 'colour')")
         source, values = read_curve(inner, "values", "reflectance")
         if values.min() < 0.0 or values.max() > 1.0:
             inner.fail(source, "must hold reflectances between 0 and 1")

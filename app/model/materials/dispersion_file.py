@@ -55,8 +55,7 @@ def _read_own(table: SceneTable, key: str) -> Dispersion:
     """One of the two indices of a crystal: the name of a glass, or a table with the keys of one."""
     if isinstance(table.raw(key), str):
         return named_glass(table, key, table.string(key))
-    inner = table.table(key)
-    assert inner is not None
+    inner = table.given_table(key, "{ n_d = 1.66, V_d = 49 }")
     found = _read_index(inner)
     inner.finish("an index of a crystal")
     return found
@@ -100,9 +99,7 @@ def _read_index(table: SceneTable) -> Dispersion:
         v_d = table.number("V_d", math.inf, infinite=True)
         return glass.from_abbe(table.number(key), v_d, name, where)
     if key == "sellmeier":
-        inner = table.table(key)
-        if inner is None:
-            table.fail(key, "must be a table {B = […], C = […]} with C in µm²")
+        inner = table.given_table(key, "{ B = […], C = […] } with C in µm²")
         b, c = inner.numbers("B"), inner.numbers("C")
         inner.finish("sellmeier")
         if c and min(map(abs, c)) > _LEAST_NM2:  # the first pole of all glass is in the ultraviolet, C = 0.02 µm²
@@ -114,9 +111,7 @@ def _read_index(table: SceneTable) -> Dispersion:
             terms = terms[:1] + tuple(_from_nm(table, key, v, 2 * i) for i, v in enumerate(terms[1:], start=1))
         return glass.cauchy(terms, name, limits, where)
     if key == "formula":
-        inner = table.table(key)
-        if inner is None:
-            table.fail(key, "must be a table {number = 1 … 9, coefficients = […]} as refractiveindex.info numbers them")
+        inner = table.given_table(key, "{ number = 1, coefficients = […] } as refractiveindex.info numbers them")
         number = inner.integer("number", at_least=1, at_most=9)
         coefficients = inner.numbers("coefficients")
         inner.finish("formula")

@@ -43,9 +43,7 @@ def read_object_material(
     elif key == "material" and isinstance(table.raw(key), Material):
         material = table.raw(key)  # from Python: one that was read before
     elif key == "material":
-        inner = table.table(key)
-        assert inner is not None
-        material = read_material(inner, textures)
+        material = read_material(table.given_table(key, '{ kind = "diffuse", colour = [0.8, 0.8, 0.8] }'), textures)
     else:
         material = Dielectric(named_glass(table, key or "", table.string("glass", DEFAULT_GLASS)))
     if table.has(GAIN):
