@@ -73,6 +73,8 @@ export class Light {
   // Floats, four a texel.
   fill(texture, width, height, values) {
     const { gl } = this;
+    if (Math.max(width, height) > gl.getParameter(gl.MAX_TEXTURE_SIZE))
+      throw new Error("this device cannot hold as many photons, polygons or lights as this page has.");
     gl.bindTexture(gl.TEXTURE_2D, texture);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, width, height, 0, gl.RGBA, gl.FLOAT, values);
   }

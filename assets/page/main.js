@@ -73,7 +73,6 @@ async function start() {
     const height = Math.round(width * shapeOfPicture);
     if (canvas.width === width && canvas.height === height) return;
     Object.assign(canvas, { width, height });
-    canvas.style.aspectRatio = `${width} / ${height}`;
     dirty.glass = dirty.map = true;
   }
 
@@ -183,6 +182,7 @@ async function start() {
     play: (what) => set({ playing: state.playing === what ? null : what, isSingle: state.isSingle || what === "nm" }),
     reset: () => set(fresh()),
     save: () => {
+      byId("framed").hidden = window === window.parent;
       whole();
       canvas.toBlob((blob) => {
         const href = URL.createObjectURL(blob), download = `${head.scene.replace(/\W+/g, "_") || "caustic"}.png`;
@@ -269,6 +269,12 @@ async function start() {
     showStill("The browser took the graphics card away: the picture is live again when it is free.");
   });
   canvas.addEventListener("webglcontextrestored", () => open().catch(stays));
+  for (const when of ["beforeprint", "afterprint"])
+    window.addEventListener(when, () => {
+      document.documentElement.classList.toggle("is-printed", when === "beforeprint"); // dark ink
+      dirty.spectrum = true;
+      whole();
+    });
   new ResizeObserver(() => set({})).observe(canvas);
   window.spectrasplat = { state, set, times, head, get light() { return light; }, frame: whole };
 }

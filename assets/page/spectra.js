@@ -3,7 +3,7 @@
 // index of the one glass that disperses, or in the wavelength where there are several.
 
 export const FIRST_NM = 380, LAST_NM = 780, COUNT = 401, D_NM = 587.5618;
-export const SAMPLES = 2048, MOST_LINES = 16;
+export const SAMPLES = 2048;
 
 export const valueAt = (values, nm) => {
   const place = Math.min(Math.max(nm - FIRST_NM, 0), COUNT - 1), i = Math.min(Math.floor(place), COUNT - 2);
@@ -52,8 +52,8 @@ export function lightTable(rows, x, response) {
   const low = Math.min(1, ...ends), high = Math.max(0, ...ends);
   const middle = (low + high) / 2, half = Math.max((high - low) / 2, 2e-4);
   const support = [middle - half, middle + half];
-  const width = SAMPLES + MOST_LINES, table = new Float32Array(4 * width * rows.length);
-  let lineCount = 0;
+  const lineCount = Math.max(...rows.map(({ lines }) => lines.length));
+  const width = SAMPLES + lineCount, table = new Float32Array(4 * width * rows.length);
   rows.forEach((spectrum, r) => {
     const energy = (nm, watts) => response.map((colour) => watts * valueAt(colour, nm));
     const base = 4 * width * r;
@@ -73,9 +73,8 @@ export function lightTable(rows, x, response) {
       for (let c = 0; c < 3; c++) below[c] += cell[c];
     }
     while (sample < SAMPLES) put(0, below);
-    spectrum.lines.slice(0, MOST_LINES).forEach(([nm, watts], k) => {
+    spectrum.lines.forEach(([nm, watts], k) => {
       table.set([...energy(nm, watts), valueAt(x, nm)], base + 4 * (SAMPLES + k));
-      lineCount = Math.max(lineCount, k + 1);
     });
   });
   return { table, width, height: rows.length, support, lineCount };

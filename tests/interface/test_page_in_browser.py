@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium is install
 FEW = photons([0.12, 0.04], [-0.04, 0.08], [8.0, 3.0], [0.001, 0.001, 0.001], [0.0, 0.5, 1.0])
 RISING = photons([0.05, 0.01], [-0.01, 0.04], [8.0, -5.0], [0.0, 0.001, 0.002], [0.2, 0.5, 0.9])
 LINES = [[546.1, 3.0], [435.8, 2.0]]
+COMB = [[400.0 + 12.0 * k, 1.0 + k % 3] for k in range(25)]
+IS_STILL = "!document.getElementById('still').hidden && document.querySelector('.panel').offsetHeight === 0"
 PROBLEM = "document.getElementById('problem').textContent"
 
 
@@ -52,6 +55,7 @@ def test_it_opens_from_a_file_and_asks_for_nothing(browser: Browser, tmp_path: P
         (RISING, 1.0, None, 0.02),
         (RISING, 0.5, None, 0.02),
         (RISING, 1.0, LINES, 0.02),
+        (RISING, 1.0, COMB, 0.02),
     ],
 )
 def test_photons_are_what_they_integrate_to(
@@ -75,18 +79,37 @@ def test_beams_are_what_their_edges_hold(
     np.testing.assert_allclose(found.sum(axis=(0, 1)), right.sum(axis=(0, 1)), rtol=0.01)
 
 
-def test_a_device_that_blends_half_floats_alone_is_less_exact(browser: Browser, tmp_path: Path) -> None:
-    script = """{
-        const all = WebGL2RenderingContext.prototype.getExtension;
-        WebGL2RenderingContext.prototype.getExtension = function (name) {
-            return name === 'EXT_float_blend' ? null : all.call(this, name);
-        };
-    }"""
+@contextmanager
+def lacking(browser: Browser, method: str, *arguments: str, answer: str = "null") -> Iterator[None]:
+    """A device of which WebGL's `method` answers so, asked for these (JavaScript)."""
+    script = f"""{{
+        const all = WebGL2RenderingContext.prototype.{method};
+        WebGL2RenderingContext.prototype.{method} = function (what) {{
+            return [{", ".join(arguments)}].includes(what) ? {answer} : all.call(this, what);
+        }};
+    }}"""
     added = browser.call("Page.addScriptToEvaluateOnNewDocument", source=script)["identifier"]
-    browser.open(written(tmp_path, FEW))
-    browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=added)
-    assert not browser.run("spectrasplat.light.isFull") and "16 bits" in browser.run("document.body.textContent")
+    try:
+        yield
+    finally:
+        browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=added)
+
+
+def test_a_device_that_blends_half_floats_alone_is_less_exact(browser: Browser, tmp_path: Path) -> None:
+    with lacking(browser, "getExtension", "'EXT_float_blend'"):
+        browser.open(written(tmp_path, FEW))
+    assert not browser.run("spectrasplat.light.isFull") and "16 bits" in browser.run("document.body.innerText")
     assert difference(shown_map(browser), photon_map(FEW, 1.0, None)) < 0.04
+
+
+def test_a_device_that_cannot_add_light_up_shows_the_still(browser: Browser, tmp_path: Path) -> None:
+    page = written(tmp_path, FEW)
+    with lacking(browser, "getExtension", "'EXT_color_buffer_float'", "'EXT_color_buffer_half_float'"):
+        browser.open(page)
+        assert "floating-point" in browser.run(PROBLEM) and browser.run(IS_STILL)
+    with lacking(browser, "getParameter", "WebGL2RenderingContext.MAX_TEXTURE_SIZE", answer="1024"):
+        browser.open(page)
+        assert "cannot hold as many photons" in browser.run(PROBLEM) and browser.run(IS_STILL)
 
 
 def test_a_key_on_the_slider_changes_the_picture(browser: Browser, tmp_path: Path) -> None:
@@ -112,16 +135,35 @@ def test_a_finger_reads_the_spectrum(browser: Browser, tmp_path: Path) -> None:
     assert "No light" in browser.run("document.getElementById('here-says').textContent")
 
 
-def test_a_phone_needs_no_scrolling_aside(browser: Browser, tmp_path: Path) -> None:
-    browser.open(written(tmp_path, FEW), 360, 740, "dark")
-    assert browser.run("document.documentElement.scrollWidth") == 360
+@pytest.mark.parametrize(
+    ("width", "height"), [(320, 560), (360, 740), (740, 360), (640, 400), (820, 1180), (1200, 700)]
+)
+def test_the_picture_stays_in_sight_of_its_controls(browser: Browser, tmp_path: Path, width: int, height: int) -> None:
+    """On phones upright and on their side, on tablets, and where text is twice as large as usual."""
+    browser.open(written(tmp_path, FEW), width, height, "dark")
+    assert browser.run("document.documentElement.scrollWidth") == width
     assert browser.run("Math.min(...[...document.querySelectorAll('button')].map((b) => b.offsetHeight || 99))") >= 40
-    unnamed = """[...document.querySelectorAll('input, select, button, canvas')]
-        .filter((e) => !e.labels?.length && !e.ariaLabel && !e.textContent.trim()).map((e) => e.id)"""
-    assert browser.run(unnamed) == []
+    for control in ("gain", "exposure"):
+        middle = f"""(() => {{
+            const control = document.getElementById('{control}'), picture = document.getElementById('picture');
+            control.scrollIntoView({{ block: 'center' }});
+            const box = control.getBoundingClientRect(), seen = picture.getBoundingClientRect();
+            const met = document.elementFromPoint(box.x + box.width / 2, box.y + box.height / 2);
+            return [met === control, seen.top, seen.bottom];
+        }})()"""
+        is_met, top, bottom = browser.run(middle)
+        assert is_met and -1 <= top < bottom <= height, control
 
 
-IS_STILL = "!document.getElementById('still').hidden && document.querySelector('.panel').offsetHeight === 0"
+def test_a_screen_reader_names_what_is_set(browser: Browser, tmp_path: Path) -> None:
+    browser.open(written(tmp_path, FEW))
+    nodes = browser.call("Accessibility.getFullAXTree")["nodes"]
+    found = {(n["role"]["value"], n["name"]["value"]) for n in nodes if not n["ignored"] and "name" in n}
+    sliders = ("Dispersion", "Wavelength in nanometres", "Exposure", "Refractive index by wavelength")
+    assert {name for role, name in found if role == "slider"} == set(sliders)
+    others = {("checkbox", "One wavelength only"), ("combobox", "Glass"), ("combobox", "Light")}
+    assert others | {("application", "A test: the light, live"), ("button", "Sweep the dispersion")} <= found
+    assert not [role for role, name in found if role in ("button", "combobox", "checkbox") and not name]
 
 
 def test_without_webgl2_it_says_what_is_needed(tmp_path: Path) -> None:
@@ -136,6 +178,22 @@ def test_a_damaged_page_shows_its_still(browser: Browser, tmp_path: Path, cut: C
     page.write_text(cut(page.read_text("utf-8")), "utf-8")
     browser.open(page)
     assert "damaged or cut off" in browser.run(PROBLEM) and browser.run(IS_STILL)
+
+
+WAITS = "document.getElementById('waits').offsetHeight > 0"
+
+
+@pytest.mark.parametrize("last", ["data:image/jpeg;base64,", "requestAnimationFrame"])
+def test_a_page_cut_off_before_its_data_says_so(browser: Browser, tmp_path: Path, last: str) -> None:
+    """Within its still, and within its script."""
+    page = written(tmp_path, FEW)
+    browser.open(page)
+    assert not browser.run(WAITS)
+    page.write_text(page.read_text("utf-8").partition(last)[0] + last, "utf-8")
+    browser.call("Page.navigate", url=page.as_uri())
+    browser.wait(f"document.readyState === 'complete' && !window.spectrasplat && {WAITS}")
+    shown = "(one) => one.checkVisibility({ visibilityProperty: true })"
+    assert not browser.run(f"[...document.querySelectorAll('button, input')].some({shown})")
 
 
 @pytest.mark.slow
@@ -180,3 +238,22 @@ def test_several_pages_live_in_one_notebook(browser: Browser, tmp_path: Path) ->
     browser.call("Page.navigate", url=outer.as_uri())
     browser.wait("frames.length === 2 && frames[0].spectrasplat?.light && frames[1].spectrasplat?.light")
     assert browser.mistakes == []
+
+
+def test_a_learning_platform_may_keep_it_in_a_sandbox(tmp_path: Path) -> None:
+    """Where it has no origin, no storage and may save nothing, which it says."""
+    script = """<script>const poll = setInterval(() => {
+        if (!window.spectrasplat) return;
+        clearInterval(poll);
+        document.getElementById('save').click();
+        const { hidden } = document.getElementById('framed');
+        parent.postMessage([origin, Boolean(spectrasplat.light), hidden], '*');
+    }, 50)</script>"""
+    inner = html.escape(written(tmp_path, FEW).read_text("utf-8") + script)
+    outer = tmp_path / "platform.html"
+    told = "<script>onmessage = ({ data }) => (window.told = data)</script>"
+    outer.write_text(f'{told}<iframe srcdoc="{inner}" sandbox="allow-scripts"></iframe>', "utf-8")
+    with Browser() as browser:
+        browser.call("Page.navigate", url=outer.as_uri())
+        browser.wait("window.told")
+        assert browser.run("told") == ["null", True, False] and browser.mistakes == []

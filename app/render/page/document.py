@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import base64
 import html
+import io
 import itertools
 import json
 import re
@@ -41,18 +42,23 @@ def data_elements(arrays: Mapping[str, np.ndarray], head: Mapping[str, Any]) -> 
 
 def document(arrays: Mapping[str, np.ndarray], head: Mapping[str, Any]) -> str:
     """The whole page. `arrays`: as docs/pages.md lists them, with `still`, a JPEG file."""
+    from PIL import Image
+
     folder = assets_dir() / "page"
 
     def text(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
     held = dict(arrays)
-    still = "data:image/jpeg;base64," + base64.b64encode(held.pop("still").tobytes()).decode()
+    file = held.pop("still").tobytes()
+    width, height = Image.open(io.BytesIO(file)).size
+    still = "data:image/jpeg;base64," + base64.b64encode(file).decode()
     title = html.escape(head["title"])
     parts = {
         "<!--TITLE-->": title,
         "<!--DESCRIPTION-->": html.escape(head["description"]),
         "<!--STILL-->": f'<img id="still" elementtiming="still" alt="{title}: a still picture" src="{still}">',
+        "<!--TALL-->": f"{height / width:.6g}",
         "<!--FIXED-->": "" if head["groups"] else " hidden",
         "<!--GLASSES-->": "".join(map(_glass_row, head["groups"], itertools.repeat(head))),
         "<!--GAIN-->": f"{head['limits']['gain_max']:g}",
