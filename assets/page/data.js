@@ -14,31 +14,30 @@ function halfFloats() {
   const values = new Float32Array(65536);
   for (let bits = 0; bits < 65536; bits++) {
     const exponent = (bits >> 10) & 31, fraction = (bits & 1023) / 1024;
-    const size = exponent === 0 ? fraction * 2 ** -14 : exponent === 31 ? (fraction ? NaN : Infinity) : (1 + fraction) * 2 ** (exponent - 15);
+    const isNormal = exponent > 0, size = (isNormal + fraction) * 2 ** (isNormal ? exponent - 15 : -14); // all finite
     values[bits] = bits & 32768 ? -size : size;
   }
   return values;
 }
-
-const KINDS = { f4: Float32Array, f2: Uint16Array, u4: Uint32Array, i4: Int32Array, u2: Uint16Array, u1: Uint8Array };
 
 // `head`, and `array(name)`: its numbers, or null where there is none; 16 bits without a sign are shares of 1.
 export async function readData(page) {
   const head = JSON.parse(page.getElementById("head").textContent);
   const bytes = await bytesOf(page.getElementById("blob").textContent);
   let halves = null;
-  const shapeOf = (name) => head.arrays[name]?.shape ?? [0];
+  const kinds = { f4: Float32Array, f2: Uint16Array, u4: Uint32Array, u2: Uint16Array, u1: Uint8Array };
   const raw = (name) => {
     const { dtype, shape, offset } = head.arrays[name];
-    return new KINDS[dtype](bytes.buffer, bytes.byteOffset + offset, shape.reduce((a, b) => a * b, 1));
+    return new kinds[dtype](bytes.buffer, bytes.byteOffset + offset, shape.reduce((a, b) => a * b, 1));
   };
   const array = (name) => {
     if (!head.arrays[name]) return null;
     const stored = raw(name), { dtype } = head.arrays[name];
     if (dtype !== "f2" && dtype !== "u2") return stored;
-    return Float32Array.from(stored, dtype === "f2" ? (bits) => (halves ??= halfFloats())[bits] : (value) => value / 65535);
+    const valueOf = dtype === "f2" ? (bits) => (halves ??= halfFloats())[bits] : (value) => value / 65535;
+    return Float32Array.from(stored, valueOf);
   };
   const picture = (name, type) =>
     createImageBitmap(new Blob([raw(name)], { type }), { colorSpaceConversion: "none", premultiplyAlpha: "none" });
-  return { head, array, shapeOf, picture };
+  return { head, array, picture };
 }

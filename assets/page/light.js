@@ -1,15 +1,16 @@
 // WebGL2: the receiver's map, and pictures of it. One draw adds up the photons, one the beams, one makes the picture.
 
-import { BEAM_FRAGMENT, BEAM_VERTEX, SOLID_FRAGMENT, SOLID_VERTEX, SPLAT_FRAGMENT, SPLAT_VERTEX, VIEW_FRAGMENT, WHOLE_VERTEX } from "./shaders.js";
-import { ABREAST, BEAM, PHOTON } from "./records.js";
-import { SAMPLES } from "./spectra.js";
-import { inverse } from "./views.js";
+import {BEAM_FRAGMENT, BEAM_VERTEX, SPLAT_FRAGMENT, SPLAT_VERTEX} from "./shaders.js";
+import {SOLID_FRAGMENT, SOLID_VERTEX, VIEW_FRAGMENT, WHOLE_VERTEX} from "./shaders.js";
+import {ABREAST, BEAM, PHOTON} from "./records.js";
+import {SAMPLES} from "./spectra.js";
+import {inverse} from "./views.js";
 
 // What is missing for it, as a sentence; null where nothing is.
 export function lackOf(gl) {
-  if (!gl) return "This browser shows no WebGL2, which the live picture needs. Any current Firefox, Chrome, Edge or Safari has it, if hardware acceleration is switched on.";
+  if (!gl) return "WebGL2 is missing: use a current Firefox, Chrome, Edge or Safari, with hardware acceleration.";
   if (!gl.getExtension("EXT_color_buffer_float") && !gl.getExtension("EXT_color_buffer_half_float"))
-    return "This device cannot draw into floating-point pictures (EXT_color_buffer_float), which adding up light needs.";
+    return "This device cannot add light up in floating-point pictures (EXT_color_buffer_float).";
   return null;
 }
 
@@ -27,25 +28,22 @@ export class Light {
     this.beams = this.program(BEAM_VERTEX, BEAM_FRAGMENT(Math.max(beams.most, 1)));
     this.view = this.program(WHOLE_VERTEX, VIEW_FRAGMENT);
     this.solid = this.program(SOLID_VERTEX, SOLID_FRAGMENT);
-    this.paths = this.texture();
-    this.light = this.texture();
-    this.edges = this.texture();
-    this.base = this.texture(gl.LINEAR);
-    this.weight = this.texture(gl.LINEAR);
+    for (const name of ["paths", "light", "edges"]) this[name] = this.texture();
+    for (const name of ["base", "weight"]) this[name] = this.texture(gl.LINEAR);
     this.map = { texture: this.texture(), framebuffer: gl.createFramebuffer() };
     this.glass = { texture: this.texture(), framebuffer: gl.createFramebuffer() };
     this.whole = gl.createVertexArray();
     this.draws = 0;
-    this.things = [[this.splats, photons, PHOTON], [this.beams, beams, BEAM]].filter(([, { count }]) => count).map(([kind, { rows, count }, floats]) => {
+    const thing = (kind, { rows, count }, floats) => {
       const records = this.texture();
       this.fill(records, (ABREAST * floats) / 4, Math.ceil(count / ABREAST), rows);
       return { kind, records, count, quads: this.corners(count) };
-    });
+    };
+    this.things = photons.count ? [thing(this.splats, photons, PHOTON)] : [];
+    if (beams.count) this.things.push(thing(this.beams, beams, BEAM));
     if (beams.count) this.fill(this.edges, 1024, beams.edges.length / 4096, beams.edges);
     this.meshes = this.solids(head, array);
   }
-
-  // ---- what is uploaded -----------------------------------------------------------------------
 
   program(vertex, fragment) {
     const { gl } = this, program = gl.createProgram();
@@ -57,16 +55,17 @@ export class Light {
     }
     gl.linkProgram(program);
     if (!gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
-      throw new Error([gl.getProgramInfoLog(program), ...gl.getAttachedShaders(program).map((s) => gl.getShaderInfoLog(s))].join("\n"));
-    const places = new Map();
-    return { program, at: (name) => (places.has(name) || places.set(name, gl.getUniformLocation(program, name)), places.get(name)) };
+      throw new Error(
+        gl.getAttachedShaders(program).map((s) => gl.getShaderInfoLog(s)) + gl.getProgramInfoLog(program));
+    const places = {};
+    return { program, at: (name) => (places[name] ??= gl.getUniformLocation(program, name)) };
   }
 
   texture(filter = this.gl.NEAREST) {
     const { gl } = this, texture = gl.createTexture();
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    for (const [name, value] of [[gl.TEXTURE_MIN_FILTER, filter], [gl.TEXTURE_MAG_FILTER, filter], [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE]])
-      gl.texParameteri(gl.TEXTURE_2D, name, value);
+    for (const kind of ["MIN", "MAG"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_${kind}_FILTER`], filter);
+    for (const side of ["S", "T"]) gl.texParameteri(gl.TEXTURE_2D, gl[`TEXTURE_WRAP_${side}`], gl.CLAMP_TO_EDGE);
     return texture;
   }
 
@@ -89,9 +88,11 @@ export class Light {
   // Two triangles each, of four corners; instances of so few are slow on many a device. Every sixteenth comes first,
   // then every fourth: so many can stand for all.
   corners(count) {
-    const { gl } = this, vertices = gl.createVertexArray(), list = new Uint32Array(6 * count), rank = (i) => (i % 4 ? 2 : i % 16 ? 1 : 0);
-    for (let pass = 0, at = 0; pass < 3; pass++)
-      for (let i = 0; i < count; i++) if (rank(i) === pass) for (const corner of [0, 1, 2, 2, 1, 3]) list[at++] = 4 * i + corner;
+    const { gl } = this, vertices = gl.createVertexArray(), list = new Uint32Array(6 * count);
+    let at = 0;
+    for (const step of [16, 4, 1])
+      for (let i = 0; i < count; i += step)
+        if (step === 16 || i % (4 * step)) list.set([0, 1, 2, 2, 1, 3].map((corner) => 4 * i + corner), 6 * at++);
     gl.bindVertexArray(vertices);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, gl.createBuffer());
     gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, list, gl.STATIC_DRAW);
@@ -102,7 +103,7 @@ export class Light {
     const { gl } = this, values = [];
     head.meshes.forEach(({ kind, colour, vertices, triangles }) => {
       const points = array(vertices), tint = kind === "glass" ? [0.8, 0.9, 1, 0.5] : [...colour, 1];
-      for (const corner of array(triangles)) values.push(points[3 * corner], points[3 * corner + 1], points[3 * corner + 2], ...tint);
+      for (const corner of array(triangles)) values.push(...points.subarray(3 * corner, 3 * corner + 3), ...tint);
     });
     const vertices = gl.createVertexArray();
     gl.bindVertexArray(vertices);
@@ -121,8 +122,6 @@ export class Light {
     this.fill(this.light, light.width, light.height, light.table);
     this.fill(this.paths, SAMPLES, 2, paths);
   }
-
-  // ---- draws ----------------------------------------------------------------------------------
 
   use({ program, at }, textures) {
     const { gl } = this;
@@ -202,7 +201,8 @@ export class Light {
     this.use(this.view, { map: this.map.texture, base: this.base, weight: this.weight, glass: this.glass.texture });
     gl.uniform2f(this.view.at("pixels"), width, height);
     gl.uniform1i(this.view.at("view"), mode);
-    gl.uniform4f(this.view.at("whites"), head.camera?.base_white ?? 0, head.camera?.weight_white ?? 0, 2 ** exposure, 0);
+    const { base_white = 0, weight_white = 0 } = head.camera ?? {};
+    gl.uniform4f(this.view.at("whites"), base_white, weight_white, 2 ** exposure, 0);
     gl.uniform3f(this.view.at("diffuse"), ...(head.reflectance_rgb ?? [1, 1, 1]).map((r) => r / Math.PI));
     gl.uniform4f(this.view.at("mark"), ...(mark ?? [0, 0]), mark ? 1 : 0, Math.max(4, width / 90));
     gl.bindVertexArray(this.whole);

@@ -1,17 +1,17 @@
 // The page: what the reader set, and the picture that follows. No server, no library; see docs/pages.md.
 
-import { readData } from "./data.js";
-import { lackOf, Light } from "./light.js";
-import { bindPanel, bindReading, byId, tell, tellIndex, VIEWS } from "./panel.js";
-import { coloursOf, drawIndex, drawSpectrum, nmUnder } from "./plots.js";
-import { lampSpectrum, spectrumAt } from "./probe.js";
-import { beamRows, photonRows } from "./records.js";
-import { COUNT, indexOf, indexTable, lightTable, placesOf, scaled, single } from "./spectra.js";
-import { areaAt, around, fromAbove, fromCamera, inverse, uvAt } from "./views.js";
+import {readData} from "./data.js";
+import {lackOf, Light} from "./light.js";
+import {bindPanel, bindReading, byId, tell, tellIndex, VIEWS} from "./panel.js";
+import {coloursOf, drawIndex, drawSpectrum, nmUnder} from "./plots.js";
+import {lampSpectrum, spectrumAt} from "./probe.js";
+import {beamRows, photonRows} from "./records.js";
+import {COUNT, indexOf, indexTable, lightTable, placesOf, scaled, single} from "./spectra.js";
+import {areaAt, around, fromAbove, fromCamera, inverse, uvAt} from "./views.js";
 
 const SLOW_MS = 100, FAST_MS = 25, SETTLED_MS = 180, WIDEST = 4, COARSEST = 16;
 const LIGHT = ["rows", "gain", "spectrum", "nm", "isSingle"], SEEN = ["space", "view", "above"];
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+const ARROWS = new Map([["ArrowLeft", [-1, 0]], ["ArrowRight", [1, 0]], ["ArrowUp", [0, -1]], ["ArrowDown", [0, 1]]]);
 
 function problem(text) {
   byId("problem").textContent = text;
@@ -30,28 +30,24 @@ async function start() {
   await byId("still").decode().catch(() => {});
   await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
   const times = { first: 0, frame: 0 };
-  const { head, array, shapeOf, picture } = await readData(document).catch(() => {
+  const { head, array, picture } = await readData(document).catch(() => {
     throw new Error("the data of this file are damaged or cut off; copy or export it again.");
   });
-  const glassN = array("glass_n"), density = array("spectra.density");
+  const [glassN, density, nmOf, variable] = ["glass_n", "spectra.density", "nm", "variable"].map(array);
   const part = (values, row) => values.subarray(COUNT * row, COUNT * (row + 1)), glass = (row) => part(glassN, row);
   const [observer, response] = ["observer", "response"].map((name) => [0, 1, 2].map((c) => part(array(name), c)));
   const spectra = head.spectra.map(({ lines }, i) => ({ density: part(density, i), lines }));
-  const nmOf = array("nm"), variable = array("variable");
   const colours = coloursOf(observer), shapeOfPicture = head.camera ? head.camera.height / head.camera.width : 0.75;
-  const records = { photons: photonRows(head, array, shapeOf), beams: beamRows(array) };
-  const fresh = () => ({
-    gain: 1, rows: head.groups.map(({ row }) => row), spectrum: -1, isSingle: false, nm: 550, exposure: 0, readNm: 588,
-    view: head.camera ? "camera" : "above", above: head.lit, space: head.around, mark: null, playing: null,
-  });
+  const records = { photons: photonRows(head, array), beams: beamRows(array) };
+  const ownLight = () => ({ gain: 1, rows: head.groups.map(({ row }) => row), spectrum: -1, isSingle: false, nm: 550 });
+  const ownView = () => ({ view: head.camera ? "camera" : "above", above: head.lit, space: head.around, exposure: 0 });
+  const fresh = () => ({...ownLight(), ...ownView(), readNm: 588, mark: null, playing: null });
   const state = fresh(), canvas = byId("picture"), shown = { index: [], rows: [], x: null, paths: null };
   const dirty = { tables: true, map: true, glass: true, spectrum: true };
   let light = null, queued = false, settle = 0, toUv = null;
   // While something moves the picture has every so many pixels only, up to WIDEST, and beyond that fewer photons, as
   // many as keep pace; all of them once it rests.
   let moves = true, coarse = WIDEST, finest = 1;
-
-  // ---- one frame ------------------------------------------------------------------------------
 
   function tables() {
     shown.index = state.rows.map((row) => indexOf(glass(row), state.gain));
@@ -85,8 +81,9 @@ async function start() {
     fit();
     if (dirty.tables) tables();
     const { width, height } = canvas, step = moves ? coarse : 1;
-    const camera = state.view === "space" ? around(head, state.space, width, height)
-      : { toUv: state.view === "above" ? fromAbove(state.above, width, height) : fromCamera(head, width, height) };
+    const flat = () =>
+      (state.view === "above" ? fromAbove(state.above, width, height) : fromCamera(head, width, height));
+    const camera = state.view === "space" ? around(head, state.space, width, height) : { toUv: flat() };
     toUv = camera.toUv;
     if (camera.eye && dirty.glass) light.drawGlass(camera, width, height);
     if (dirty.map) light.gather(toUv, width, height, Math.min(step, WIDEST), Math.max(step / WIDEST, 1) ** 2);
@@ -115,7 +112,7 @@ async function start() {
 
   function whole() {
     moves = false;
-    dirty.map = true;
+    dirty.map = dirty.spectrum = true;
     frame(performance.now());
   }
 
@@ -137,8 +134,6 @@ async function start() {
     if (state.playing) moves = dirty.tables = dirty.map = dirty.spectrum = true;
   }
 
-  // ---- the place under the finger ----------------------------------------------------------------
-
   const markPixel = () => state.mark && uvAt(inverse(toUv), ...state.mark);
 
   // At the ring; of the lamp while there is none.
@@ -157,8 +152,6 @@ async function start() {
     const box = canvas.getBoundingClientRect(), ratio = canvas.width / box.width;
     set({ mark: uvAt(toUv, (event.clientX - box.left) * ratio, (event.clientY - box.top) * ratio) });
   }
-
-  // ---- what the reader does ------------------------------------------------------------------------
 
   function set(changes) {
     Object.assign(state, changes);
@@ -197,15 +190,15 @@ async function start() {
     const spread = ([p, q] = fingers.values()) => Math.hypot(p.x - q.x, p.y - q.y);
     const nearer = (factor) => {
       const { view, above, space } = state;
-      if (view === "above") set({ above: { ...above, across: above.across * factor } });
-      if (view === "space") set({ space: { ...space, radius: space.radius * factor } });
+      if (view === "above") set({ above: {...above, across: above.across * factor } });
+      if (view === "space") set({ space: {...space, radius: space.radius * factor } });
     };
     const drag = (dx, dy) => {
       const scale = Math.min(canvas.clientWidth, canvas.clientHeight), { view, above, space } = state;
       const turn = space.turn - (3 * dx) / scale, lift = Math.min(Math.max(space.lift + (3 * dy) / scale, -1.5), 1.5);
-      if (view === "space") set({ space: { ...space, turn, lift } });
+      if (view === "space") set({ space: {...space, turn, lift } });
       const [u, v] = above.centre, k = above.across / scale;
-      if (view === "above") set({ above: { ...above, centre: [u - dx * k, v + dy * k] } });
+      if (view === "above") set({ above: {...above, centre: [u - dx * k, v + dy * k] } });
     };
     canvas.addEventListener("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
@@ -232,7 +225,7 @@ async function start() {
       nearer(1.001 ** event.deltaY);
     }, { passive: false });
     canvas.addEventListener("keydown", (event) => {
-      const [dx, dy] = ARROWS[event.key] ?? [0, 0];
+      const [dx, dy] = ARROWS.get(event.key) ?? [0, 0];
       if (event.key === "+" || event.key === "-") nearer(event.key === "+" ? 0.9 : 1.1);
       if (!dx && !dy) return;
       event.preventDefault();
@@ -241,8 +234,6 @@ async function start() {
       set({ mark: uvAt(toUv, x + dx * step, y + dy * step) ?? state.mark });
     });
   }
-
-  // ---- the beginning ---------------------------------------------------------------------------------
 
   async function open() {
     const gl = canvas.getContext("webgl2", { antialias: false, alpha: false, powerPreference: "high-performance" });
@@ -272,7 +263,6 @@ async function start() {
   for (const when of ["beforeprint", "afterprint"])
     window.addEventListener(when, () => {
       document.documentElement.classList.toggle("is-printed", when === "beforeprint"); // dark ink
-      dirty.spectrum = true;
       whole();
     });
   new ResizeObserver(() => set({})).observe(canvas);

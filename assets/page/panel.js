@@ -1,6 +1,6 @@
 // The controls: what a reader sets, in words that a screen reader speaks too.
 
-import { abbeNumber, LAST_NM, FIRST_NM, valueAt } from "./spectra.js";
+import {abbeNumber, LAST_NM, FIRST_NM, valueAt} from "./spectra.js";
 
 export const byId = (id) => document.getElementById(id);
 export const VIEWS = ["camera", "above", "space"];
@@ -8,9 +8,9 @@ export const VIEWS = ["camera", "above", "space"];
 // Binds the page: `set(changes)` takes what the reader wants, `act` has step, reset, save, play(what).
 export function bindPanel(head, state, set, act) {
   const onInput = (element, changes) =>
-    element.addEventListener("input", () => set({ ...changes(element), playing: null }));
-  document.querySelectorAll("#glasses select").forEach((select, g) =>
-    onInput(select, ({ value }) => ({ rows: state.rows.with(g, Number(value)) })));
+    element.addEventListener("input", () => set({...changes(element), playing: null }));
+  document.querySelectorAll("#glasses select")
+    .forEach((select, g) => onInput(select, ({ value }) => ({ rows: state.rows.with(g, Number(value)) })));
   for (const id of ["gain", "spectrum", "exposure"]) onInput(byId(id), ({ value }) => ({ [id]: Number(value) }));
   onInput(byId("single"), ({ checked }) => ({ isSingle: checked }));
   onInput(byId("nm"), ({ value }) => ({ nm: Number(value), isSingle: true }));

@@ -1,6 +1,6 @@
 // Two small graphs: the index by wavelength, and the spectrum at a place.
 
-import { COUNT, FIRST_NM, LAST_NM, valueAt } from "./spectra.js";
+import {COUNT, FIRST_NM, LAST_NM, valueAt} from "./spectra.js";
 
 // Colour of a wavelength on a screen, by the observer's own table (linear Rec.709 up to a factor).
 export function coloursOf(observer) {

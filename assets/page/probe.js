@@ -1,7 +1,7 @@
 // The spectrum of the light at one place of the receiver, from the photons and beams themselves, without the map.
 
-import { BEAM, PHOTON } from "./records.js";
-import { COUNT, FIRST_NM, SAMPLES, valueAt } from "./spectra.js";
+import {BEAM, PHOTON} from "./records.js";
+import {COUNT, FIRST_NM, SAMPLES, valueAt} from "./spectra.js";
 
 const STEP_NM = 10;
 
@@ -14,10 +14,10 @@ const powers = ({ density, lines }) => BINS.map((middle, k) => {
 });
 
 // The lamp's own: [{ nm, power }] in steps of 10 nm.
-export const lampSpectrum = (spectrum) => powers(spectrum).map((power, k) => ({ nm: BINS[k], power }));
+export const lampSpectrum = (spectrum) => powers(spectrum).map((power, k) => ({nm: BINS[k], power}));
 
 // The same of what falls on a place. `rows`: a spectrum a light, `x` of every nanometre, `texel` in units.
-export function spectrumAt([u, v], { head, photons, beams, paths, rows, x, texel }) {
+export function spectrumAt([u, v], {head, photons, beams, paths, rows, x, texel}) {
   const found = BINS.map((nm) => ({ nm, power: 0, x: valueAt(x, nm) })), power = rows.map(powers);
   addPhotons(found, power, photons, paths, head.photons.smoothing, texel, u, v);
   addBeams(found, power, beams, u, v);

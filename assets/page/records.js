@@ -5,17 +5,19 @@ const table = (count, floats) => new Float32Array(floats * ABREAST * Math.ceil(c
 
 // Place, change with the third index; sides; change with two indices; x and row; throughput, 0; points of its
 // lattice, edge of its light, by how much it widens along its sides.
-const PLACES = { position: 0, axis_s: 4, axis_t: 6, dposition_dn: 8, x: 12, light: 15, throughput: 16, lattice: 20, edge: 21, fan: 22 };
+const PLACES = ["position", "axis_s", "axis_t", "dposition_dn", "x", "light", "throughput", "lattice", "edge", "fan"];
+const PLACED_AT = [0, 4, 6, 8, 12, 15, 16, 20, 21, 22];
 
-export function photonRows(head, array, shapeOf) {
-  const count = shapeOf("photons.position")[0], rows = table(count, PHOTON);
+export function photonRows(head, array) {
+  const count = (array("photons.position")?.length ?? 0) / 2, rows = table(count, PHOTON);
   const put = (name, at, first) => {
     const values = array(`photons.${name}`), width = values ? values.length / count : 0;
     const unit = name === "throughput" ? head.photons.unit : 1;
     for (let i = 0; i < count; i++)
-      for (let k = first; k < Math.min(width, first + 4); k++) rows[PHOTON * i + at + k - first] = values[width * i + k] * unit;
+      for (let k = first; k < Math.min(width, first + 4); k++)
+        rows[PHOTON * i + at + k - first] = values[width * i + k] * unit;
   };
-  for (const [name, at] of Object.entries(PLACES)) put(name, at, 0);
+  PLACES.forEach((name, k) => put(name, PLACED_AT[k], 0));
   put("dposition_dn", 2, 4);
   return { rows, count };
 }
@@ -24,23 +26,28 @@ export function photonRows(head, array, shapeOf) {
 export function beamRows(array) {
   const x = array("beams.x"), count = x ? x.length / 2 : 0, rows = table(count, BEAM);
   if (!count) return { rows, count, most: 0, edges: new Float32Array(0) };
-  const [density, slope, centre, light, first, edge, hullFirst, hull] =
-    ["density", "slope", "centre", "light", "first", "edge", "hull_first", "hull"].map((name) => array(`beams.${name}`));
+  const names = ["density", "slope", "centre", "light", "first", "edge", "hull_first", "hull"];
+  const [density, slope, centre, light, first, edge, hullFirst, hull] = names.map((name) => array(`beams.${name}`));
   const edges = new Float32Array(4096 * Math.ceil(edge.length / 4096));
   let most = 0;
   for (let i = 0; i < count; i++) {
-    const { middle, along, half } = rectangle(hull, hullFirst[i], hullFirst[i + 1]), [a, b, c] = density.subarray(3 * i);
-    rows.set([...middle, along[0] * half[0], along[1] * half[0], half[1], first[i], first[i + 1] - first[i], light?.[i] ?? 0,
-      a, 4 * b - 3 * a - c, 2 * (a - 2 * b + c), 0, slope[2 * i], slope[2 * i + 1], centre[2 * i], centre[2 * i + 1], x[2 * i], x[2 * i + 1]], BEAM * i);
+    const { middle, along, half } = rectangle(hull, hullFirst[i], hullFirst[i + 1]);
+    const [a, b, c] = density.subarray(3 * i), two = (values) => values.subarray(2 * i, 2 * i + 2);
+    rows.set([...middle, along[0] * half[0], along[1] * half[0], half[1], first[i], first[i + 1] - first[i]], BEAM * i);
+    rows.set([light?.[i] ?? 0, a, 4 * b - 3 * a - c, 2 * (a - 2 * b + c), 0], BEAM * i + 7);
+    [slope, centre, x].forEach((values, k) => rows.set(two(values), BEAM * i + 12 + 2 * k));
     // Of a polygon narrower than its penumbrae only their mean is seen: all its edges are as soft.
-    const softness = Array.from(edge.subarray(8 * first[i], 8 * first[i + 1])).filter((_, k) => k % 4 === 3).map((soft) => Math.max(soft, 0));
-    const widest = Math.max(...softness), isNarrow = Math.sqrt(4 * half[0] * half[1]) < 4 * widest;
+    let widest = 0;
+    for (let k = 8 * first[i] + 3; k < 8 * first[i + 1]; k += 4) widest = Math.max(widest, edge[k]);
+    const isNarrow = Math.sqrt(4 * half[0] * half[1]) < 4 * widest;
     most = Math.max(most, first[i + 1] - first[i]);
     for (let e = first[i]; e < first[i + 1]; e++) {
       const line = edge.subarray(8 * e, 8 * e + 8);
       const scale = 2 / (Math.hypot(line[0], line[1]) + Math.hypot(line[4], line[5]));
-      const [from, to] = [0, 4].map((k) =>
-        [line[k] * scale, line[k + 1] * scale, (line[k + 2] + line[k] * middle[0] + line[k + 1] * middle[1]) * scale + (line[k + 3] < 0 && !isNarrow ? 1e6 : 0), isNarrow ? widest : line[k + 3]]);
+      const distance = ([a, b, c, soft]) =>
+        (c + a * middle[0] + b * middle[1]) * scale + (soft < 0 && !isNarrow ? 1e6 : 0);
+      const [from, to] = [line.subarray(0, 4), line.subarray(4)].map(
+        (end) => [end[0] * scale, end[1] * scale, distance(end), isNarrow ? widest : end[3]]);
       edges.set(from, 8 * e);
       edges.set(to.map((value, k) => value - from[k]), 8 * e + 4);
     }
@@ -61,6 +68,6 @@ function rectangle(hull, from, to) {
       low[axis] = Math.min(low[axis], place);
       high[axis] = Math.max(high[axis], place);
     });
-  const half = [0, 1].map((axis) => (high[axis] - low[axis]) / 2), [p, q] = [0, 1].map((axis) => (high[axis] + low[axis]) / 2);
+  const [half, [p, q]] = [-1, 1].map((sign) => [0, 1].map((axis) => (high[axis] + sign * low[axis]) / 2));
   return { middle: [p * ex - q * ey, p * ey + q * ex], along, half };
 }

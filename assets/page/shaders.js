@@ -41,7 +41,8 @@ vec4 line_of(int row, int k) { return texelFetch(light, ivec2(SAMPLES + k, row),
 // Two triangles of four vertices for each record of so many texels.
 const RECORDS = (texels) => `
 uniform sampler2D records;
-vec4 record(int k) { return texelFetch(records, ivec2(${texels} * ((gl_VertexID >> 2) & 255) + k, gl_VertexID >> 10), 0); }
+const int TEXELS = ${texels};
+vec4 record(int k) { return texelFetch(records, ivec2(TEXELS * ((gl_VertexID >> 2) & 255) + k, gl_VertexID >> 10), 0); }
 vec2 corner() { return vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1) * 2.0 - 1.0; }
 `;
 

@@ -17,22 +17,22 @@ export function indexOf(glass, gain) {
 }
 
 // (n_d - 1) / (n_F - n_C).
-export const abbeNumber = (glass) =>
-  (valueAt(glass, D_NM) - 1) / (valueAt(glass, 486.1327) - valueAt(glass, 656.2725));
+export const abbeNumber = (glass) => (valueAt(glass, D_NM) - 1) / (valueAt(glass, 486.1327) - valueAt(glass, 656.2725));
 
-// x of every nanometre, and whether all of it was traced. `nm`: the wavelength at equal steps of x, where x is not affine
-// in the index.
+// x of every nanometre, and whether all of it was traced. `nm`: the wavelength at equal steps of x, where x is not
+// affine in the index.
 export function placesOf(head, index, nm) {
   const span = head.n_at_1 - head.n_at_0, free = new Float64Array(COUNT);
   for (let i = 0, k = 0; i < COUNT; i++) {
     while (k < nm.length - 2 && nm[k + 1] < FIRST_NM + i) k++;
-    free[i] = head.mode === "index" ? (index[i] - head.n_at_0) / span : (k + (FIRST_NM + i - nm[k]) / (nm[k + 1] - nm[k])) / (nm.length - 1);
+    free[i] = head.mode === "index" ? (index[i] - head.n_at_0) / span :
+                                      (k + (FIRST_NM + i - nm[k]) / (nm[k + 1] - nm[k])) / (nm.length - 1);
   }
   return { x: free.map((x) => Math.min(Math.max(x, 0), 1)), isWithin: free.every((x) => x > -1e-4 && x < 1 + 1e-4) };
 }
 
 // A spectrum, { density (401,), lines [[nm, W]] }, of another power.
-export function scaled({ density, lines }, scale) {
+export function scaled({density, lines}, scale) {
   return { density: density.map((w) => w * scale), lines: lines.map(([nm, w]) => [nm, w * scale]) };
 }
 
@@ -45,10 +45,11 @@ export function single(nm, spectrum) {
 // Rows of the shaders' table: (red, green, blue, 0) below each place between the ends of the light, then its lines
 // (red, green, blue, x). A row a spectrum; `response`: what each colour gets of a watt, by nanometre.
 export function lightTable(rows, x, response) {
-  const ends = rows.flatMap(({ density, lines }) => [
-    ...x.filter((_, i) => [i - 1, i, i + 1].some((k) => density[k] > 0)),
-    ...lines.flatMap(([nm]) => [valueAt(x, nm) - 2e-4, valueAt(x, nm) + 2e-4]),
-  ]);
+  const ends = [];
+  for (const { density, lines } of rows) {
+    ends.push(...x.filter((_, i) => [i - 1, i, i + 1].some((k) => density[k] > 0)));
+    for (const [nm] of lines) ends.push(valueAt(x, nm) - 2e-4, valueAt(x, nm) + 2e-4);
+  }
   const low = Math.min(1, ...ends), high = Math.max(0, ...ends);
   const middle = (low + high) / 2, half = Math.max((high - low) / 2, 2e-4);
   const support = [middle - half, middle + half];
@@ -60,12 +61,9 @@ export function lightTable(rows, x, response) {
     // Cells of a nanometre, half ones at the ends; even within.
     const below = [0, 0, 0], step = (support[1] - support[0]) / (SAMPLES - 1);
     let sample = 0;
-    const put = (share, cell) => {
-      for (let c = 0; c < 3; c++) table[base + 4 * sample + c] = below[c] + share * cell[c];
-      sample++;
-    };
+    const put = (share, cell) => table.set(below.map((sum, c) => sum + share * cell[c]), base + 4 * sample++);
     for (let i = 0; i < COUNT; i++) {
-      const from = valueAt(x, FIRST_NM + Math.max(i - 0.5, 0)), to = valueAt(x, FIRST_NM + Math.min(i + 0.5, COUNT - 1));
+      const [from, to] = [i - 0.5, i + 0.5].map((middle) => valueAt(x, FIRST_NM + middle));
       if (to <= 0 || from >= 1) continue; // beyond what was traced
       const cell = energy(FIRST_NM + i, spectrum.density[i] * (i % (COUNT - 1) ? 1 : 0.5));
       while (sample < SAMPLES && support[0] + sample * step < to)
@@ -73,9 +71,8 @@ export function lightTable(rows, x, response) {
       for (let c = 0; c < 3; c++) below[c] += cell[c];
     }
     while (sample < SAMPLES) put(0, below);
-    spectrum.lines.forEach(([nm, watts], k) => {
-      table.set([...energy(nm, watts), valueAt(x, nm)], base + 4 * (SAMPLES + k));
-    });
+    spectrum.lines.forEach(
+      ([nm, watts], k) => table.set([...energy(nm, watts), valueAt(x, nm)], base + 4 * (SAMPLES + k)));
   });
   return { table, width, height: rows.length, support, lineCount };
 }

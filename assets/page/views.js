@@ -6,7 +6,7 @@ const mul = (a, k) => a.map((x) => k * x);
 const plus = (a, b, k) => [a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]];
 const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 const unit = (a) => mul(a, 1 / (Math.hypot(...a) || 1));
-const HALF_ANGLE = 0.35;  // of the view all round, over the canvas' smaller side
+const HALF_ANGLE = 0.35; // of the view all round, over the canvas' smaller side
 
 export const uvAt = (m, px, py) => {
   const [u, v, w] = [0, 3, 6].map((row) => m[row] * px + m[row + 1] * py + m[row + 2]);
@@ -23,18 +23,18 @@ export const areaAt = ([a, b, c, d, e, f, g, h, i], [px, py]) =>
   Math.abs(dot([a, b, c], cross([d, e, f], [g, h, i])) / (g * px + h * py + i) ** 3);
 
 // The scene's own camera, on a canvas of another size.
-export const fromCamera = ({ camera }, width, height) =>
+export const fromCamera = ({camera}, width, height) =>
   camera.pixel_to_uv.flat().map((value, i) => value * [camera.width / width, camera.height / height, 1][i % 3]);
 
 // Straight from above: `centre` (u, v), units across the canvas' smaller side.
-export function fromAbove({ centre, across }, width, height) {
+export function fromAbove({centre, across}, width, height) {
   const k = across / Math.min(width, height);
   return [k, 0, centre[0] - (k * width) / 2, 0, -k, centre[1] + (k * height) / 2, 0, 0, 1];
 }
 
-// About a place, to `radius` on either side: angles round the up axis and above the horizon; `axes`: two of the horizon,
-// up. Also what the glass is drawn with.
-export function around({ plane }, { target, axes: [side, ahead, up], turn, lift, radius }, width, height) {
+// About a place, to `radius` on either side: angles round the up axis and above the horizon; `axes`: two of the
+// horizon, up. Also what the glass is drawn with.
+export function around({plane}, {target, axes: [side, ahead, up], turn, lift, radius}, width, height) {
   const { cos, sin } = Math, distance = radius / Math.tan(HALF_ANGLE);
   const back = plus(mul(plus(mul(side, cos(turn)), ahead, sin(turn)), cos(lift)), up, sin(lift));
   const eye = plus(target, back, distance), right = unit(cross(up, back)), over = cross(back, right);

@@ -37,10 +37,11 @@ def test_the_linter_is_content() -> None:
     assert complaints("ruff", "check", "--output-format", "concise", ".") == ""
 
 
-def test_shaders_are_formatted() -> None:
-    """By .clang-format, but for what .clang-format-ignore lists."""
+def test_shaders_and_scripts_are_formatted() -> None:
+    """By .clang-format."""
     clang_format = pytest.importorskip("clang_format", reason="clang-format is not installed: pip install '.[test]'")
     files = [path for path in (ROOT / "shaders").rglob("*.*") if path.suffix != ".md"]
+    files += (ROOT / "assets" / "page").glob("*.js")
     command = [clang_format.get_executable("clang-format"), "--dry-run", "-Werror", *files]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, f"run 'clang-format -i' on these\n{done.stderr}"
