@@ -165,12 +165,10 @@ async function start() {
   }
 
   const act = {
-    // A lesson's step: by names.
-    step: ({ gain = 1, glass: name, nm, spectrum: lamp }) => {
-      const { rows } = fresh(), row = head.glasses.findIndex((one) => one.name === name);
-      if (row >= 0) rows[0] = row;
-      const chosen = head.spectra.findIndex((one) => one.name === lamp);
-      set({ gain, rows, isSingle: nm !== undefined, nm: nm ?? state.nm, spectrum: chosen, playing: null });
+    // A lesson's step: a spectrum by its name.
+    step: ({ gain = 1, nm, spectrum: name }) => {
+      const spectrum = head.spectra.findIndex((one) => one.name === name);
+      set({...ownLight(), gain, spectrum, isSingle: nm !== undefined, nm: nm ?? state.nm, playing: null });
     },
     play: (what) => set({ playing: state.playing === what ? null : what, isSingle: state.isSingle || what === "nm" }),
     reset: () => set(fresh()),

@@ -9,6 +9,7 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.commands.gallery import _MAKERS, _entries, _key
 from spectrasplat.commands.table import Gallery
 from spectrasplat.render.page.site import Card, write_documents, write_index
+from spectrasplat.render.page.spectra import offered_spectra
 
 
 def test_documents_point_to_what_is_in_the_site(tmp_path: Path) -> None:
@@ -36,7 +37,9 @@ def test_what_has_no_page_is_listed_without_a_link(tmp_path: Path) -> None:
 
 def test_names_are_those_of_scenes_and_lessons() -> None:
     assert [entry.page for entry in _entries(["newton", "prism"])] == ["lessons/newton.html", "scenes/prism.html"]
-    assert all(step["set"] and step["text"] for entry in _entries([]) for step in entry.steps)
+    steps = [step for entry in _entries([]) for step in entry.steps]
+    assert steps and all(step["text"] and step["set"].keys() <= {"gain", "nm", "spectrum"} for step in steps)
+    assert {step["set"].get("spectrum") for step in steps} <= {None, *offered_spectra()}
     with pytest.raises(UserError, match="did you mean 'prism'"):
         list(_entries(["prysm"]))
 
