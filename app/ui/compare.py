@@ -38,8 +38,6 @@ if TYPE_CHECKING:
     from ..render.viewer.threaded_engine import Engine
 
 REFERENCE, GLASS, FILE = "reference", "glass", "file"
-STAND_IN = "stochastic-even"
-"""Takes the reference's place where that cannot be computed."""
 _NOTHING = (0, 0)
 STRIPE_PX, STRIPE_SHADE = 6, 0.25
 """Width of the stripes over what the reference does not hold, and the share of the picture's light that they leave."""
@@ -93,7 +91,7 @@ class Comparison:
     def _picture(self) -> moderngl.Texture | None:
         if not self._compare.is_active:
             return None
-        if self._shows_reference:
+        if self._compare.method == REFERENCE:
             return self._composed
         if self._compare.method == FILE:
             return self._file.texture
@@ -116,7 +114,7 @@ class Comparison:
                 return "" if self._compare.file is None else self._compare.file.name
             case "glass":
                 return self._compare.glass
-        if not self._shows_reference:
+        if self._compare.method != REFERENCE:
             return METHOD_NAMES.get(self._method, self._method)
         snapshot = self._thread.snapshot if self._thread is not None else None
         return "Reference" if snapshot is None else f"Reference, {self._noise(snapshot)}"
@@ -126,7 +124,7 @@ class Comparison:
         """How far the other picture is, 0 to 1."""
         if not self._compare.is_active or self._begun is None:
             return None
-        if self._shows_reference:
+        if self._compare.method == REFERENCE:
             return None if self._thread is None else self._thread.fraction
         if self._engine is None:
             return None
@@ -139,17 +137,18 @@ class Comparison:
             return ""
         if self._compare.method == FILE:
             return self._file_text
-        if self._shows_reference:
+        if self._compare.method == REFERENCE:
             return self._reference_text(self._begun)
         photons = f"{(0 if self._engine is None else self._engine.stats.photons) / 1e6:.2f} million photons"
         if self._compare.method == GLASS:
             if self._glass_problem is not None:
                 return f"There is nothing to compare with: {self._glass_problem}."
             return f"The same scene in {self._compare.glass}: {photons}."
-        note = f"{METHOD_NAMES.get(self._method, self._method)}: {photons}."
-        return note if self._compare.method != REFERENCE else f"There is no reference: {self._thread_problem}. {note}"
+        return f"{METHOD_NAMES.get(self._method, self._method)}: {photons}."
 
     def _reference_text(self, begun: LiveInputs) -> str:
+        if self._thread is not None and self._thread.problem is not None:
+            return f"There is nothing to compare with: {self._thread.problem}."
         snapshot = self._thread.snapshot if self._thread is not None else None
         if snapshot is None:
             return "Reference: the first photons are on their way; the first time, its code is compiled before."
@@ -176,14 +175,15 @@ class Comparison:
         """It would use more time (the window must not sleep)."""
         if not self._compare.is_active or self.is_stale:
             return False
-        thread = self._thread if self._compare.method == REFERENCE else None
-        refers = thread is not None and not thread.is_done and thread.problem is None
-        return refers or (self._engine is not None and self._needs_engine and not self._engine.is_idle)
+        if self._compare.method == REFERENCE:
+            return self._thread is not None and not self._thread.is_done and self._thread.problem is None
+        return self._engine is not None and self._needs_engine and not self._engine.is_idle
 
     @property
     def is_waiting(self) -> bool:
         """The reference is wanted and has nothing to show yet."""
-        return self.is_busy and self._shows_reference and self._thread is not None and self._thread.snapshot is None
+        thread = self._thread if self._compare.method == REFERENCE else None
+        return self.is_busy and thread is not None and thread.snapshot is None
 
     def pixel(self, place: tuple[float, float]) -> Vec3 | None:
         """Linear Rec.709 of `picture` at a place of it, 0..1 from the top left; None while there is none."""
@@ -243,22 +243,14 @@ class Comparison:
 
     @property
     def _method(self) -> str:
-        """The other method; of the reference, its substitute."""
+        """The other method."""
         if self._compare.method == GLASS and self._begun is not None:
             return self._begun.method
-        return STAND_IN if self._compare.method == REFERENCE else self._compare.method
-
-    @property
-    def _thread_problem(self) -> str | None:
-        return self._thread.problem if self._thread is not None else None
-
-    @property
-    def _shows_reference(self) -> bool:
-        return self._compare.method == REFERENCE and self._thread_problem is None
+        return self._compare.method
 
     @property
     def _needs_engine(self) -> bool:
-        return not self._shows_reference and self._compare.method != FILE
+        return self._compare.method not in (REFERENCE, FILE)
 
     def _start_reference(self, begun: LiveInputs) -> None:
         scene = scene_seen(with_panorama_lights(begun.scene), begun.camera, begun.solo_nm)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..base.image_io import read_image
-from ..edit.glass import bent, set_dispersion
+from ..edit.glass import set_dispersion
 from ..model.optics import catalogue
 
 if TYPE_CHECKING:
@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from ..model.scene import Scene
 
 
-LOWER_INDEX, _LOWER = "n_d − 0.001", 1e-3
-"""In place of a glass's name: the error map is then the picture's derivative, red where it becomes brighter."""
-
-
 class GlassSwap:
     """A scene with one object of another glass; the same value as long as nothing changes."""
 
@@ -33,15 +29,13 @@ class GlassSwap:
         self._scene: Scene | None = None
 
     def scene(self, scene: Scene, selection: Selection, glass: str) -> Scene:
-        """`scene` with the selected solid, or else the first, of the catalogue's `glass`, or of its own with
-        `LOWER_INDEX`. Raises `UserError`."""
+        """`scene` with the selected solid, or else the first, of the catalogue's `glass`. Raises `UserError`."""
         index = glass_object(scene, selection)
         if index is None:
             raise UserError("nothing in this scene is glass, so there is no other glass to compare with")
         key = (scene, index, glass)
         if self._scene is None or self._key[0] is not scene or self._key[1:] != key[1:]:
-            lower = bent(scene.objects[index].material.dispersion, "n_d", -_LOWER) if glass == LOWER_INDEX else None
-            self._scene = set_dispersion(scene, index, lower or catalogue.find(glass))
+            self._scene = set_dispersion(scene, index, catalogue.find(glass))
             self._key = key
         return self._scene
 

@@ -100,16 +100,10 @@ class ReferenceThread:
             self._compute()
         except UserError as error:
             self.problem = str(error)
-        except ImportError as error:
-            self.problem = f"the reference renderer needs numba ({error})"
         except MemoryError:
             self.problem = "there is not enough memory for a reference of this size"
-        except (
-            RuntimeError,
-            ValueError,
-            ArithmeticError,
-            LookupError,
-        ) as error:  # a fault of ours must not die unseen in a thread
+        except (ImportError, RuntimeError, ValueError, ArithmeticError, LookupError) as error:
+            # A fault of ours must not end unseen in a thread.
             self.problem = f"the reference renderer failed ({type(error).__name__}: {error})"
 
     def _compute(self) -> None:

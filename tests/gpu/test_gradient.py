@@ -11,7 +11,6 @@ from scipy.ndimage import gaussian_filter
 from spectrasplat.base.generators import finished
 from spectrasplat.edit.glass import bent
 from spectrasplat.edit.parameters import Stage
-from spectrasplat.edit.state import Selection
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.glass import with_gain
@@ -19,7 +18,6 @@ from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.frames import FrameRenderer
 from spectrasplat.render.gradient import Gradient, gradient, nudged
-from spectrasplat.ui.compared_with import LOWER_INDEX, GlassSwap
 
 BALL = """
 [[lights]]
@@ -131,11 +129,3 @@ def test_a_bent_glass_has_the_numbers_it_was_bent_to() -> None:
         raised = bent(dispersion, "index", 1e-3)
         nm = np.array([400.0, 550.0, 700.0])
         assert raised.index(nm) - dispersion.index(nm) == pytest.approx(1e-3, abs=2e-6)
-
-
-def test_a_window_compares_with_a_lower_index(tmp_path: Path) -> None:
-    """The error map against it is the picture's derivative by n_d."""
-    scene = loaded(tmp_path)
-    lower = GlassSwap().scene(scene, Selection(), LOWER_INDEX)
-    n_d = [its.objects[0].material.dispersion.n_d for its in (scene, lower)]
-    assert n_d[0] - n_d[1] == pytest.approx(1e-3, abs=2e-6)

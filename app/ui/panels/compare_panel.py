@@ -14,7 +14,6 @@ from ...base.tone_map import LUMINANCE_709
 from ...edit.requests import ComputeReference
 from ...edit.state import Compare, CompareMode, State
 from .. import theme
-from ..compared_with import LOWER_INDEX
 from ..view_model import ViewModel
 from . import file_browser, rows, spectrum_strip, widgets
 from .methods import MENU_METHODS, METHOD_TIPS
@@ -37,11 +36,8 @@ _TIPS = {
     "glass": "The same scene with one solid of another glass, traced in its own engine.",
     "file": "A picture from a file, such as another program's of the same view.",
 }
-_GLASSES = (LOWER_INDEX, "N-BK7", "F2", "N-SF11", "N-SF66", "water", "diamond")
-_OF_SOLID = (
-    "Of the selected solid, or else of the first. With a slightly lower n_d the error map is the picture's derivative "
-    "by n_d: red becomes brighter, blue darker."
-)
+_GLASSES = ("N-BK7", "F2", "N-SF11", "N-SF66", "water", "diamond")
+_OF_SOLID = "Of the selected solid, or else of the first."
 ERROR_RANGE = 0.5
 """Relative error at the ends of the map's scale (`passes.display.ERROR_RANGE`)."""
 _LEGEND_STEPS = 40
@@ -74,7 +70,7 @@ def _controls(state: State, view_model: ViewModel) -> State:
         present = {
             item.material.dispersion.name for item in state.scene.objects if item.material.dispersion is not None
         }
-        others_of = [name for name in _GLASSES[1:] if not any(one.endswith(name) for one in present)]
+        others_of = [name for name in _GLASSES if not any(one.endswith(name) for one in present)]
         compare = replace(compare, glass=others_of[0] if others_of else compare.glass)
     compare = replace(compare, mode=mode, method=method)
     if method == "glass":
