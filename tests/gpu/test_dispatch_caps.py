@@ -33,22 +33,22 @@ def queueing():
     context.release()
 
 
-def traced(context, name: str, seconds: float, method: str = "srd") -> LightPass:
+def traced(context, name: str, seconds: float, method: str = "srd", photons: int = PHOTONS) -> LightPass:
     scene = load_scene(shipped_scenes()[name])
-    settings = RenderSettings(width=96, height=54, photons=PHOTONS, method=method)
+    settings = RenderSettings(width=96, height=54, photons=photons, method=method)
     buffers = scene_buffers(context, scene, settings)
     light = LightPass(context, scene, settings, buffers.features, buffers)
     light.batches.dispatch_seconds = light.batches.splatting.dispatch_seconds = seconds
     light.prepare()
     for splatter in _splatters(light):
         splatter.dispatch_seconds = seconds
-    light.begin(PHOTONS, 1)
+    light.begin(photons, 1)
     sizes: list[int] = []
     steps, splat = light.trace.steps, light.maps.splatter.run
     light.trace.steps = lambda parts, *rest: (sizes.append(light.trace.rays_of(parts)), steps(parts, *rest))[1]  # type: ignore[method-assign]
     light.maps.splatter.run = lambda photons, *rest: (sizes.append(photons.count), splat(photons, *rest))[1]  # type: ignore[method-assign]
     for _ in range(2):
-        for _ in light.pass_steps(0, PHOTONS):
+        for _ in light.pass_steps(0, photons):
             pass
     light.finish()
     light.sizes = sizes  # type: ignore[attr-defined]
@@ -90,7 +90,7 @@ def test_slow_devices_get_small_portions_and_the_same_light(queueing, name: str,
 
 def test_the_processor_has_no_caps(gl) -> None:
     """Sums in another order would be rounded otherwise from run to run."""
-    light = traced(gl, "prism", SLOW, "srd-photons")
+    light = traced(gl, "prism", SLOW, "srd-photons", 4_000)
     try:
         assert light.batches.splatting._part is None
         assert light.batches.budget.units == light.trace.batch

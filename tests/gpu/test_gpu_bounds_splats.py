@@ -117,8 +117,11 @@ def test_a_list_without_room_for_all_pieces_holds_all_light(gl: Context, monkeyp
     assert want.max() > 0.0
 
 
-@pytest.mark.parametrize("by_compute", [False, True])
-@pytest.mark.parametrize("features", [FEATURES, Features(spectral_groups=1, band_cuts=True)], ids=["whole", "cut"])
+@pytest.mark.parametrize(
+    ("features", "by_compute"),
+    [(FEATURES, False), (Features(spectral_groups=1, band_cuts=True), True)],
+    ids=["whole, drawn", "cut, added"],
+)
 def test_packed_records_make_the_same_maps(
     gl: Context, monkeypatch: pytest.MonkeyPatch, features: Features, by_compute: bool
 ) -> None:

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base import paths
-from spectrasplat.edit.document import Document
 from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.edit.state import State
 from spectrasplat.gpu import context as context_module
@@ -23,6 +22,7 @@ from spectrasplat.gpu import linker, shader
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.device_traits import DeviceTraits, assumed
 from spectrasplat.gpu.linker import BINARIES, Pending, linker_of
+from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.render.viewer.building import COMPILING
 from spectrasplat.render.viewer.engine import LiveEngine
 
@@ -198,7 +198,7 @@ def test_a_viewer_goes_on_with_what_it_has_while_the_driver_compiles(
     ahead: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     link = linker_of(ahead.ctx)
-    scene = Document.new().scene
+    scene = load_scene(paths.shipped_scenes()["prism"])
     wanted = replace(State(scene, scene.camera).live_inputs, width=48, height=27)
     engine = LiveEngine(ahead, replace(ahead.traits.viewer, first_photons=512, largest_photons=512))
     engine.target_photons, engine.camera_samples = 1, 1

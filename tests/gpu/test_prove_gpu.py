@@ -172,8 +172,7 @@ def test_what_only_measures_is_cut(
     assert sum(part.limit_s[0] for part in prove_gpu.chosen_parts(None, quick=True)) <= prove_gpu.QUICK_S
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-@pytest.mark.parametrize("after_s", [0.5, 6.0])
+@pytest.mark.parametrize(("number", "after_s"), [(signal.SIGTERM, 0.5), (signal.SIGINT, 6.0)])
 def test_a_signal_leaves_whole_lines(tmp_path: Path, number: signal.Signals, after_s: float) -> None:
     command = [sys.executable, "-P", "-m", "spectrasplat", "prove-gpu", "--quick", "--short", "-o", str(tmp_path)]
     heeding = partial(signal.signal, number, signal.SIG_DFL)  # which shells' background jobs do not

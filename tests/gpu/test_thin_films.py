@@ -119,8 +119,7 @@ def test_gold_behind_glass_is_paler_than_in_air(gl: Context, polarised: bool) ->
     assert render_probe(gl, scene, PROBE).mean == pytest.approx(expected, rel=3e-3)
 
 
-@pytest.mark.parametrize("degrees", [0.0, 50.0, 80.0])
-@pytest.mark.parametrize("polarised", [False, True])
+@pytest.mark.parametrize(("degrees", "polarised"), [(0.0, False), (50.0, True), (80.0, False), (80.0, True)])
 @pytest.mark.parametrize("name", [*SHEETS, "gold", "oiled aluminium"])
 def test_a_film_in_a_furnace(gl: Context, name: str, degrees: float, polarised: bool) -> None:
     """All that comes back of white light: all of it, but for what metal absorbs."""
