@@ -11,6 +11,9 @@ from .lifetimes import lifetimes_of
 from .polygons import BeamPieces, BeamPolygons, parabola_at
 from .search import LEAF_PIECE, LEAF_RECEIVER, LEAF_TAIL
 
+_ON_BORDER = 1e-7
+"""Share of a receiver's radius."""
+
 
 @jit
 def hulls_of(corners, starts, grow, points, chain, ends, out):
@@ -72,6 +75,8 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
     t = lives.bands[exists]
     own = np.repeat(np.cumsum(exists) - 1, np.diff(starts))
     bounds = (lives.bounds | (chosen.edge["soft"] < 0.0)) & np.repeat(exists, np.diff(starts))
+    inside = bounds & ~_are_borders(edges, np.repeat(leaf["facet"], np.diff(starts)), scene)
+    bounds = inside | (bounds & (np.bincount(own[inside], minlength=len(t))[own] == 0))
     kept, own = edges[bounds], own[bounds]
     counts = np.bincount(own, minlength=len(t))
     change = kept[:, 4:] - kept[:, :4]
@@ -99,6 +104,23 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
         hulls,
         lives.areas[exists],
     )
+
+
+def _are_borders(edges: np.ndarray, facet: np.ndarray, scene: BeamScene) -> np.ndarray:
+    """bool (E,): which edges of polygons on the facets `facet` (E,) run along the borders of receivers of one facet.
+    Texels that a border crosses must hold what whole ones would: nothing is looked up beyond."""
+    owners = scene.facets["owner"]
+    used, own = np.unique(facet, return_inverse=True)
+    corners, frame = scene.facets["corner"][used], scene.facets["frame"][used]
+    count = np.where(np.bincount(owners)[owners[used]] == 1, scene.facets["corners"][used], 0)[:, None]
+    number = np.arange(corners.shape[1])
+    following = np.where(number + 1 < count, number + 1, 0)
+    places = np.einsum("fkx,fwx->fkw", corners - frame[:, None, 0], frame[:, 1:])[own]
+    off = np.zeros(places.shape[:2])
+    for line in (edges[:, None, :3], edges[:, None, 4:7]):
+        off = np.maximum(off, np.abs(np.sum(line[..., :2] * places, axis=2) + line[..., 2]))
+    lies_on = (number < count)[own] & (off < _ON_BORDER * scene.facets["radius"][used][own, None])
+    return np.any(lies_on & np.take_along_axis(lies_on, following[own], axis=1), axis=1)
 
 
 def pieces_of(leaves: list[Leaves], scene: BeamScene, light: int, measure: float) -> BeamPieces:
