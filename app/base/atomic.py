@@ -147,7 +147,7 @@ def _reserved(target: Path, part: Path) -> Iterator[int]:
     try:
         try:
             with suppress(FileNotFoundError):
-                os.stat(target)  # a name that is too long is told now, not after the work
+                os.stat(target)  # a name that is too long is reported now, not after the work
             _sweep(part.parent)
             while descriptor < 0:
                 descriptor = os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_CLOEXEC", 0), 0o666)

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 
 
 class UserError(Exception):
-    """A mistake in what the user gave us, told in one sentence with a way out."""
+    """A mistake in what the user gave us, in one sentence with a way out."""
 
     exit_code = 2
 

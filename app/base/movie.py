@@ -116,16 +116,16 @@ class Film:
         if not self.frames:
             self._given_up()
             return
-        _, told = self._process.communicate()
+        _, log = self._process.communicate()
         if self._process.returncode:
-            raise self._given_up(told)
+            raise self._given_up(log)
         self._output.__exit__(None, None, None)
 
-    def _given_up(self, told: bytes | None = None) -> UserError:
+    def _given_up(self, log: bytes | None = None) -> UserError:
         """Leave nothing behind; what is to be said about it."""
-        if told is None:
-            _, told = self._process.communicate()
-        stop = UserError(f"cannot write {self._path}: {_last_line(told)}")
+        if log is None:
+            _, log = self._process.communicate()
+        stop = UserError(f"cannot write {self._path}: {_last_line(log)}")
         self._output.__exit__(UserError, stop, None)
         return stop
 
@@ -323,8 +323,8 @@ def _ffmpeg() -> str:
         ) from error
 
 
-def _last_line(told: bytes) -> str:
-    lines = [line for line in told.decode(errors="replace").splitlines() if line.strip()]
+def _last_line(log: bytes) -> str:
+    lines = [line for line in log.decode(errors="replace").splitlines() if line.strip()]
     return f"ffmpeg says '{lines[-1].strip()}'" if lines else "ffmpeg ended without a word (is the disk full?)"
 
 

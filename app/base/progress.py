@@ -45,7 +45,7 @@ class Phase(str):
 
 class ProgressReporter:
     """Call it with (fraction 0…1, text, which may be a `Phase`); use it as a context manager so that the bar ends.
-    The time left is told once it can be known.
+    The time left is shown once it is known.
 
     `clock` returns seconds and `stream` is stderr unless a test says otherwise.
     """

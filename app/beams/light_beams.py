@@ -99,7 +99,7 @@ class BeamFinder:
         ]
 
     def _is_thin(self, light: Light) -> bool:
-        """Whether a parallel light is too thin for its beams to be told apart from nothing: photons carry it."""
+        """Whether a parallel light is too thin for its beams to be distinguished from nothing: photons carry it."""
         return light.has_place and min(light.half_extent) * self._unit < _THINNEST
 
     def find(

@@ -1,6 +1,6 @@
 """What differs between devices in how the programs are built and how much work they are given at a time.
 
-The only place where renderers are told apart by name: all other code reads a `DeviceTraits`. The
+The only place where renderers are distinguished by name: all other code reads a `DeviceTraits`. The
 numbers of llvmpipe were measured with Mesa 22.3 on two cores.
 """
 

@@ -86,7 +86,7 @@ class PassTimers:
         """Count the device's work within the block towards pass `name` and tell `tell` its seconds in `hear`, once they
         are known, so that nobody waits. A block within another counts as the other's.
 
-        Where timers do not work nothing is counted, and who wants to be told waits for the device."""
+        Where timers do not work nothing is counted, and who asks for times waits for the device."""
         if not self.work:
             started = time.perf_counter()
             yield

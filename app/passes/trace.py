@@ -47,7 +47,7 @@ class FluxTally:
     (`carried_w` in trace.comp), as it is drawn, not by what its anchor has left."""
 
     emitted: float = 0.0
-    handed: float = 0.0
+    carried_on: float = 0.0
     """What photons carried on that beams had left (`beam_emission`), besides what lights emitted; less what beams left,
     where both are counted."""
     left_to_beams: float = 0.0
@@ -59,7 +59,7 @@ class FluxTally:
     def merge(self, other: FluxTally) -> None:
         """Add another batch."""
         self.emitted += other.emitted
-        self.handed += other.handed
+        self.carried_on += other.carried_on
         self.left_to_beams += other.left_to_beams
         self.roulette += other.roulette
         for name in self.ended:
@@ -81,7 +81,7 @@ class FluxTally:
     @property
     def imbalance(self) -> float:
         """|emitted + carried on − all that ended − roulette's balance|, as a share of emitted + carried on."""
-        started = self.emitted + self.handed
+        started = self.emitted + self.carried_on
         return abs(started - sum(self.ended.values()) - self.roulette) / started if started else 0.0
 
 
@@ -340,7 +340,7 @@ class TracePass:
         self._queue.load(rays)
         self._set_parameters({light: self._carried_on(light, self.max_depth, split_threshold)})
         batch = yield from self._follow(self.max_depth)
-        batch.tally.handed = float(rays["flux_w"].sum(dtype=float))
+        batch.tally.carried_on = float(rays["flux_w"].sum(dtype=float))
         return batch
 
     def _follow(self, max_depth: int) -> Generator[None, None, Batch]:

@@ -367,7 +367,7 @@ class BeamLight:
         tally = self.tally(1.0)
         stats.entered_w += (tally.emitted - stats.entered_w) / stats.searches
         stats.deposited_w += (tally.ended["deposited"] - stats.deposited_w) / stats.searches
-        stats.left_w += (-tally.handed - stats.left_w) / stats.searches
+        stats.left_w += (-tally.carried_on - stats.left_w) / stats.searches
 
     def tally(self, weight: float) -> FluxTally:
         """Where the light of the last search went, W times `weight`."""
@@ -375,7 +375,7 @@ class BeamLight:
         for light, sums in self.found.sums.items() if self.found is not None else ():
             watts = weight * float(self._buffers.light_power[light].band(0.0, 1.0)[3])
             tally.emitted += watts * float(sums[SUM_ENTERED])
-            tally.handed -= watts * float(sums[SUM_LEFT])
+            tally.carried_on -= watts * float(sums[SUM_LEFT])
             tally.roulette += watts * float(sums[SUM_ROULETTE])
             for name, index in _ENDS.items():
                 tally.ended[name] += watts * float(sums[index])

@@ -76,8 +76,8 @@ class RenderStats:
             *(f"  {name:<17} {flux / total:10.6f}" for name, flux in tally.ended.items()),
             f"  {'roulette':<17} {tally.roulette / total:10.6f}",
             *(
-                [f"  {'carried on':<17} {-tally.handed / total:10.6f}   (beams left it to photons)"]
-                if tally.handed
+                [f"  {'carried on':<17} {-tally.carried_on / total:10.6f}   (beams left it to photons)"]
+                if tally.carried_on
                 else []
             ),
             f"  {'unaccounted':<17} {tally.imbalance:10.2e}   (emitted − all of the above)",

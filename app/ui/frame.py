@@ -114,7 +114,7 @@ def run_frame(session: Session, draw: Draw, budget_s: float = DEFAULT_BUDGET_S, 
     session.autosave.update(
         session.document.scene, session.document.title, session.document.source, session.document.unsaved
     )
-    _tell_once(session, "autosave", session.autosave.problem)
+    _report_once(session, "autosave", session.autosave.problem)
     _work(session, budget_s, slice_s)
     session.was_interacting = session.state.interacting
 
@@ -151,11 +151,11 @@ def _carry_out(session: Session, kind: type, work: Callable[[], None]) -> None:
         )
 
 
-def _tell_once(session: Session, of: str, problem: str | None) -> None:
+def _report_once(session: Session, of: str, problem: str | None) -> None:
     """Show the problem of the autosave or of the picture, when it begins."""
-    if problem is not None and problem != session.told.get(of):
+    if problem is not None and problem != session.reported.get(of):
         session.messages.show(sentence(problem), is_error=True)
-    session.told[of] = problem
+    session.reported[of] = problem
 
 
 def _succeeded(session: Session) -> None:
@@ -183,7 +183,7 @@ def _work(session: Session, budget_s: float, slice_s: float) -> None:
         return
     finally:
         session.engine_s = session.clock() - started
-    _tell_once(session, "picture", None if session.picture.shader_error else session.picture.problem)
+    _report_once(session, "picture", None if session.picture.shader_error else session.picture.problem)
     now = session.clock()
     try:
         session.picture.show(session.state, now, session.delta_s, session.jobs.comparison)

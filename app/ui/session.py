@@ -96,8 +96,8 @@ class Session:
         """In the last frame."""
         self.frames = 0
         """Since the layout last changed."""
-        self.told: dict[str, str | None] = {}
-        """What is wrong with the autosave and the picture, as far as the user was told."""
+        self.reported: dict[str, str | None] = {}
+        """What is wrong with the autosave and the picture, as far as the user has been shown it."""
         self.wanted_hz = 60.0
         self._frame_started = self._last_start = clock()
         self.delta_s = 1 / 60

@@ -150,7 +150,7 @@ def test_photons_carry_what_beams_leave_in_a_scene_of_any_size(gl, tmp_path: Pat
         stats, tally = by_beams.beam_stats, by_beams.stats.tally
         assert stats is not None and 0.01 < stats.left_w / stats.entered_w < 0.7
         # What beams say they left, and what photons took up.
-        assert abs(tally.handed) < 0.01 * stats.left_w * PHOTONS
+        assert abs(tally.carried_on) < 0.01 * stats.left_w * PHOTONS
         assert tally.roulette == pytest.approx(0.0, abs=2e-3 * tally.emitted)
         assert landing(by_beams) == pytest.approx(share, rel=5e-3)
         # What grazes the table lands beyond the map of either.

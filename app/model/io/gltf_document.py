@@ -229,7 +229,7 @@ class Additions:
 
 
 def open_document(path: str | os.PathLike[str]) -> GltfDocument:
-    """Open a .glb or .gltf. Raises UserError for anything that is not a sound glTF 2.0 container."""
+    """Open a .glb or .gltf. Raises UserError for anything that is not a valid glTF 2.0 container."""
     path = Path(path)
     try:
         data = files.read_bytes(path, files.DATA_BYTES)

@@ -287,7 +287,7 @@ CHOSEN_FAULTS = [fault for fault in FAULTS if fault.label not in ("nothing", "ev
 
 @case("eye-meshes", "fault", CHOSEN_FAULTS)
 def eye_meshes(context: Context, faults: Sequence[Fault]) -> Measured:
-    """Mesh files with slivers, zero normals, doubled vertices and holes, seen against the sound solid
+    """Mesh files with slivers, zero normals, doubled vertices and holes, seen against the intact solid
 
     Normals of nothing are NaN, and so are the columns that they bend. A hole lets rays in that no medium can follow:
     that only has to stay finite."""

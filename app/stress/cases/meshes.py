@@ -269,7 +269,7 @@ FAULTS = (
 
 @case("mesh-files", "fault", FAULTS)
 def mesh_files(context: Context, faults: Sequence[Fault]) -> Measured:
-    """Mesh files with slivers, zero normals, doubled vertices and holes, against the sound solid
+    """Mesh files with slivers, zero normals, doubled vertices and holes, against the intact solid
 
     Normals of nothing are NaN; slivers leak; holes confuse inside and outside: what is lost there only has to be
     counted."""
