@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -75,17 +75,70 @@ class Search:
     """Leaves of one facet that the source sees: with more, a search is given up."""
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """A source's beams, ready to be followed from the facets that it sees."""
+
+    args: tuple[np.ndarray, ...]
+    jobs: list[tuple[np.ndarray, np.ndarray]]
+    """NODE (1,) and WORK (1,) each."""
+    sums: np.ndarray
+    blocked: set[int]
+
+
+Found = tuple[list[Leaves], np.ndarray, set[int]]
+
+
 def search(
     scene: BeamScene,
-    emission: Emission,
-    how: Search,
+    sources: Sequence[tuple[Emission, Search]],
     threads: int | None = None,
     go_on: GoOn = lambda steps: True,
-) -> tuple[list[Leaves], np.ndarray, set[int]]:
-    """Follow one source's beams. Returns the leaves, in an order that depends on the scene alone, sums over all of
-    them (`search.SUM_…`), and objects that something not flat may hide, so that photons carry what this source
+) -> list[Found]:
+    """Follow beams of `sources`. Returns of each the leaves, in an order that depends on the scene alone, sums over all
+    of them (`search.SUM_…`), and objects that something not flat may hide, so that photons carry what this source
     casts on them. `go_on` may end it early, where the result is not needed: every step is reported to it once, in any
     order."""
+    begun = [_begin(scene, emission, how) for emission, how in sources]
+
+    def one(job: tuple[tuple[np.ndarray, ...], int, np.ndarray, np.ndarray]) -> Leaves:
+        args, most, root, work = job
+        store = Store()
+        stack = take_stack()
+        stack[FIRST : FIRST + 1] = root
+        work["top"] = FIRST + 1
+        while work["top"][0] > FIRST and work["count"][0, 0] < most:
+            work["steps"] = _STEPS
+            run(stack, *args, scene.obstacles, work, store.leaf, store.edge, store.corner)
+            if not go_on(_STEPS - int(work["steps"][0])):
+                break
+            if work["steps"][0] > 0 and work["top"][0] > FIRST:
+                store.grow()
+        _stacks.append(stack)
+        return store.leaves(work["count"][0])
+
+    # Threads have little to do in Python, where they would wait for each other.
+    jobs = [
+        (each.args, how.most, root, work)
+        for each, (_, how) in zip(begun, sources, strict=True)
+        for root, work in each.jobs
+    ]
+    if len(jobs) < 2:
+        done = [one(job) for job in jobs]
+    else:
+        from concurrent.futures import ThreadPoolExecutor
+
+        with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+            done = list(pool.map(one, jobs))
+    found, first = list[Found](), 0
+    for each in begun:
+        leaves = done[first : first + len(each.jobs)]
+        first += len(leaves)
+        found.append((leaves, each.sums + sum(work["sums"][0] for _, work in each.jobs), each.blocked))
+    return found
+
+
+def _begin(scene: BeamScene, emission: Emission, how: Search) -> _Begun:
     sums = np.zeros(SUMS)
     tables = np.vstack([scene.tables, emission.power, emission.watts])
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
@@ -118,38 +171,12 @@ def search(
     sums[SUM_ENTERED] = sum(flux_in(root, 0, tables, work) for root, work in jobs)
     entered = sum(power_of(root, 0, tables, work) for root, work in jobs)
     if not jobs or entered <= 0.0:
-        return [], sums, blocked
+        return _Begun(args, [], sums, blocked)
     relative = entered if how.power is None else math.sqrt(entered * how.power)
     for _, work in jobs:
         work["threshold"] = threshold = _rounded(how.threshold * relative)
         work["faint"] = how.faint / how.threshold * threshold
-
-    def one(job: tuple[np.ndarray, np.ndarray]) -> Leaves:
-        root, work = job
-        store = Store()
-        stack = take_stack()
-        stack[FIRST : FIRST + 1] = root
-        work["top"] = FIRST + 1
-        while work["top"][0] > FIRST and work["count"][0, 0] < how.most:
-            work["steps"] = _STEPS
-            run(stack, *args, scene.obstacles, work, store.leaf, store.edge, store.corner)
-            if not go_on(_STEPS - int(work["steps"][0])):
-                break
-            if work["steps"][0] > 0 and work["top"][0] > FIRST:
-                store.grow()
-        _stacks.append(stack)
-        return store.leaves(work["count"][0])
-
-    from concurrent.futures import ThreadPoolExecutor
-
-    if len(jobs) == 1:
-        done = [one(jobs[0])]
-    else:
-        with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-            done = list(pool.map(one, jobs))
-    for _, work in jobs:
-        sums += work["sums"][0]
-    return done, sums, blocked
+    return _Begun(args, jobs, sums, blocked)
 
 
 def _rounded(threshold: float) -> float:

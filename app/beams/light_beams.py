@@ -6,6 +6,7 @@ import copy
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
@@ -142,25 +143,35 @@ class BeamFinder:
             left: list[BeamPieces] = []
             leaves: list[Leaves] = []
             measure = self._unit**2 if scene.lights[i].is_parallel else 1.0
-            for number, part in enumerate(parts):
-                how = Search(
-                    threshold,
-                    seed + 7919 * number,
-                    depth,
-                    _TOLERANCE * texel,
-                    power=total / watts[i] if watts[i] > 0.0 else None,
-                    faint=0.0 if i in plays else _TAILS_PLAY * threshold,
+            sources = [
+                (
+                    part,
+                    Search(
+                        threshold,
+                        seed + 7919 * number,
+                        depth,
+                        _TOLERANCE * texel,
+                        power=total / watts[i] if watts[i] > 0.0 else None,
+                        faint=0.0 if i in plays else _TAILS_PLAY * threshold,
+                    ),
                 )
-                found, part_sums, part_blocked = search(beams, part, how, threads, go_on)
+                for number, part in enumerate(parts)
+            ]
+            searched = (
+                search(beams, sources[k : k + _AT_ONCE], threads, go_on) for k in range(0, len(parts), _AT_ONCE)
+            )
+            for found, part_sums, part_blocked in chain.from_iterable(searched):
                 leaves += found
                 sums += part_sums
                 blocked |= part_blocked
                 done += 1
-                if part is parts[-1] or sum(len(some.leaf) for some in leaves) > _TOGETHER:
+                if sum(len(some.leaf) for some in leaves) > _TOGETHER:
                     cast.append(polygons_of(leaves, beams, i, self._unit))
                     left.append(pieces_of(leaves, beams, i, measure))
                     leaves = []
                 yield done / steps
+            cast.append(polygons_of(leaves, beams, i, self._unit))
+            left.append(pieces_of(leaves, beams, i, measure))
             if blocked:
                 # Photons carry what these objects cast: all of it, whichever point of the light it comes from.
                 cast = [some.where(~np.isin(some.source, list(blocked))) for some in cast]
@@ -195,6 +206,8 @@ _TAILS_PLAY = 1.0 / 16.0
 """Share of the threshold below which what is left to photons plays roulette."""
 _TOGETHER = 10_000
 """Leaves, about, of an extended light's points that are converted at once."""
+_AT_ONCE = 16
+"""Points of an extended light that are followed together."""
 _TOLERANCE = 0.25
 """Texels."""
 _THINNEST = 1e-6

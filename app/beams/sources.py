@@ -26,6 +26,8 @@ _NEAREST = 1.65
 them, and more would be drawn than lands."""
 _MOST_BANDS = 32
 """Bands into which a light's spectrum is cut where something is coloured, at most."""
+_FEW = 8
+"""Points of a rectangle that may lie in one row."""
 _ON_FACET = 2e-7
 """GPU units: a light as near to a facet is on it (START_DISTANCE of shaders/lib/intersect.glsl)."""
 _GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
@@ -254,8 +256,10 @@ def _places(count: int) -> np.ndarray:
 
 def _grid(count: int, half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Middles (n, 2), in [-1, 1]², of about `count` cells, as nearly square as can be, of a rectangle with half sides
-    `half` (2,); and the radii (2,) of a disc with a cell's variances."""
-    across = min(max(1, round(math.sqrt(count * half[0] / half[1]))), count)
+    `half` (2,); and the radii (2,) of a disc with a cell's variances. A strip has two rows, since penumbrae of one are
+    not as deep as it is wide where its edges lie aslant."""
+    rows = 1 if count < _FEW else 2
+    across = min(max(rows, round(math.sqrt(count * half[0] / half[1]))), count // rows)
     cells = np.array([across, max(1, round(count / across))])
     u, v = np.meshgrid(*((2.0 * np.arange(n) + 1.0) / n - 1.0 for n in cells))
     return np.column_stack([u.ravel(), v.ravel()]), 2.0 / math.sqrt(3.0) * half / cells

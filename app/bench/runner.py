@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..gpu.context import Context
+from ..model.flat_faces import with_flat_faces
 from ..model.panorama_lights import with_panorama_lights
 from ..model.scene import Scene
 from ..reference import metrics
@@ -81,7 +82,7 @@ class _SceneBench:
         start_seconds: float,
     ) -> None:
         self._context, self._store, self._progress, self._subject = context, store, progress, subject
-        self._scene, self._start_seconds = with_panorama_lights(scene), start_seconds
+        self._scene, self._start_seconds = with_flat_faces(with_panorama_lights(scene)), start_seconds
         self._settings = store.result.settings
         self._size = picture_size(scene, self._settings)
         key = subject.key(scene, *self._size)

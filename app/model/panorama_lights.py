@@ -75,6 +75,13 @@ class PanoramaWindow:
     def _across(self) -> np.ndarray:
         return np.cross(self.toward, self.tangent)
 
+    @property
+    def solid_angle_sr(self) -> float:
+        a, b = self.half
+        if self.is_disc:
+            return 2.0 * math.pi * (1.0 - 1.0 / math.hypot(1.0, a))
+        return 4.0 * math.asin(a * b / (math.hypot(1.0, a) * math.hypot(1.0, b)))
+
     def light(self, name: str, centre: np.ndarray, distance: float) -> AreaLight:
         """Seen from `centre` (3,): so far away that it looks the same from everywhere near."""
         width, height = (2.0 * distance * half for half in self.half)
@@ -147,7 +154,9 @@ def lights_of(environment: Environment) -> tuple[tuple[DirectionalLight | Panora
             window = _window(environment, rgb, spot, around, solid)
             if window is not None:
                 found.append(window)
-                rgb = rgb - _covered(environment, window)[..., None] * window.radiance
+                covered = _covered(environment, window)
+                covered *= window.solid_angle_sr / (covered * solid).sum()
+                rgb = rgb - covered[..., None] * window.radiance
     if not found:
         return (), environment
     rest = rgb.astype(np.float32)
@@ -168,7 +177,10 @@ def _regions(bright: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         # The seam of the columns is turned away from the region.
         turn = width // 2 - int(column)
         labels, _ = ndimage.label(np.roll(left > _EDGE * peak, turn, axis=1))
-        spot, ring = labels == labels[row, width // 2], np.zeros(left.shape, bool)
+        own = {labels[row, width // 2]}
+        for pole in (labels[0], labels[-1]):  # where all columns meet
+            own |= set(pole[pole > 0]) if own & set(pole) else set()
+        spot, ring = np.isin(labels, list(own)), np.zeros(left.shape, bool)
         (rows, columns), room = ndimage.find_objects(spot.astype(np.uint8))[0], _RING + 1
         box = (
             slice(max(rows.start - room, 0), rows.stop + room),
@@ -243,15 +255,19 @@ def _window(
 def _covered(environment: Environment, window: PanoramaWindow) -> np.ndarray:
     """Share of each texel that a window covers, float64 (H, W)."""
     height, width = environment.rgb.shape[:2]
-    columns, rows = np.meshgrid(np.arange(width), np.arange(height))
-    reach = math.cos(math.atan(math.hypot(*window.half)) + 2.0 * math.pi / height)
+    angle = math.atan(math.hypot(*window.half)) + 2.0 * math.pi / height
+    polar = math.acos(np.clip((environment.world_to_local @ window.toward)[2], -1.0, 1.0))
+    near_rows = np.flatnonzero(np.abs((np.arange(height) + 0.5) * math.pi / height - polar) < angle)
+    columns, rows = np.meshgrid(np.arange(width), near_rows)
+    reach = math.cos(angle)
     near = direction_of(environment, (columns + 0.5) / width, (rows + 0.5) / height) @ window.toward > reach
     rows, columns = rows[near], columns[near]
     places = (np.arange(_FINER) + 0.5) / _FINER
     u = (columns[:, None, None] + places[None, None]) / width + np.zeros((1, _FINER, 1))
     v = (rows[:, None, None] + places[None, :, None]) / height + np.zeros((1, 1, _FINER))
     found = np.zeros((height, width))
-    found[rows, columns] = window.covers(direction_of(environment, u, v)).mean(axis=(1, 2))
+    covers = window.covers(direction_of(environment, u, v))
+    found[rows, columns] = np.average(covers, axis=(1, 2), weights=np.sin(np.pi * v))  # by solid angle
     return found
 
 

@@ -173,7 +173,11 @@ def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = 
     """All texels of the scene's receivers; `finer`: factor on their number; `gutter`: texels round each chart."""
     scene, receivers = buffers.scene, buffers.receivers
     tiles: list[_Side] = []
-    share = finer * min(1.0, MOST_TEXELS / (max(len(receivers), 1) * (FINE_TEXELS + COARSE_TEXELS)))
+    # Faces of one object (`model.flat_faces`), which have its name, share its texels.
+    areas = [float(mesh.areas().sum()) for mesh in buffers.world_meshes]
+    names = [item.name for item in scene.objects]
+    of_name = {name: sum(areas[i] for i in receivers if names[i] == name) for name in set(names)}
+    share = finer * min(1.0, MOST_TEXELS / (max(len({names[i] for i in receivers}), 1) * (FINE_TEXELS + COARSE_TEXELS)))
     for receiver, index in enumerate(receivers):
         item, mesh = scene.objects[index], buffers.world_meshes[index]
         if not item.mesh.is_flat:
@@ -187,6 +191,7 @@ def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = 
             for number, window in enumerate(windows):
                 texels = COARSE_TEXELS if number + 1 == len(windows) else BETWEEN_TEXELS
                 texels = FINE_TEXELS if number == 0 else texels
+                texels = round(texels * areas[index] / max(of_name[item.name], 1e-300))
                 size = _size(window, share * texels * (0.25 if back else 1.0))
                 tiles.append(_Side(receiver, size, frame, window, back, finer=windows[number - 1] if number else None))
     placed, size = pack([tile.size for tile in tiles], 4096)

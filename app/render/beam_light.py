@@ -153,7 +153,7 @@ class BeamLight:
         self.stats = BeamStats()
         self._surveyed = self._with_tails = 1.0
         """Beams that are followed at `SURVEY`: where weak ones play roulette, and where they are left to photons."""
-        self._light_parts = LIGHT_PARTS[0]
+        self._light_parts, self._beams_a_point = LIGHT_PARTS[0], 1.0
         self._survey_polygons: BeamPolygons | None = None
         """What maps are fitted to."""
         self.found: LightBeams | None = None
@@ -199,6 +199,7 @@ class BeamLight:
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
         self._surveyed, self._with_tails = max(1.0, found.followed() * to_survey), max(1.0, strongest.followed())
+        self._beams_a_point = self._with_tails / light_parts
         if strongest.polygons is not None:
             self._light_parts = parts_for(strongest.polygons, self._watts(strongest.polygons), light_parts)
 
@@ -259,9 +260,13 @@ class BeamLight:
         surveyed = self._with_tails if tails else self._surveyed
         growth = _GROWTH_WITH_TAILS if tails else _GROWTH
         finest = _finest(SURVEY, surveyed)
+        # Even the strongest beams of all points may be more than there is time for.
+        affordable = _ENOUGH * photons / self._photons_a_beam / self._beams_a_point
+        light_parts = max(count for count in LIGHT_PARTS if count <= max(affordable, LIGHT_PARTS[0]))
+        light_parts = min(light_parts, self._light_parts)
         while True:
             threshold = max(self._threshold(photons, surveyed, growth), finest)
-            find = partial(self.finder.find, threshold, self._depth, word, self._light_parts, tails=tails)
+            find = partial(self.finder.find, threshold, self._depth, word, light_parts, tails=tails)
             search = self._worker.searched(find)
             found = yield from mapped(timed(search, partial(stats.count, "find_seconds")), lambda share: 0.5 * share)
             # Where light leaves the scene soon, fewer weak beams follow than expected: the search is done again, finer.

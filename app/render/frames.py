@@ -20,6 +20,7 @@ from ..features.features import Features
 from ..gpu import shader
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
+from ..model.flat_faces import with_flat_faces
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.panorama_lights import with_panorama_lights
 from ..model.scene import Camera, Scene
@@ -117,7 +118,7 @@ class FrameRenderer:
 
         Where light changes, `shader.keep_programs` on the context spares compiling every frame's programs."""
         self._context = context
-        stages = [_with_lights(s) for s in stages]
+        stages = [_as_rendered(s, settings) for s in stages]
         moves = any(s.camera != stages[0].camera for s in stages)
         # Light is traced once for all views, so no single one may decide what the programs leave out.
         self._settings = settings = replace(settings, any_view=settings.any_view or moves)
@@ -145,7 +146,7 @@ class FrameRenderer:
         """Render a frame, pausing with the share done. What was done when `stop()` turned true is a picture too."""
         self.seconds, self.phase, self._progress = FrameSeconds(), _PREPARING, self._progress_of_camera()
         yield from self._survey()
-        stage = _with_lights(stage)
+        stage = _as_rendered(stage, self._settings)
         if self.traced is None or not share_light(self.traced.inputs, inputs_of(stage, self._settings)):
             yield from self._trace(stage, stop)
         if not self._shows_map:
@@ -155,7 +156,7 @@ class FrameRenderer:
         """Make the light pass of `stage` ready to be traced by the caller: `light`, whose maps are empty."""
         yield from self._survey()
         self.release()
-        stage = _with_lights(stage)
+        stage = _as_rendered(stage, self._settings)
         self.traced = self._made(stage, inputs_of(stage, self._settings))
         for _ in self.traced.light.preparing():
             yield 0.0
@@ -301,7 +302,7 @@ class FrameRenderer:
         assert traced is not None and traced.camera_pass is not None, "steps() comes first, and not of a map"
         traced.camera_pass.release()
         traced.camera_pass = self._pass_of(traced, layer)
-        yield from self._see(_with_lights(stage), stop)
+        yield from self._see(_as_rendered(stage, self._settings), stop)
 
     def run(self, stage: Stage) -> np.ndarray:
         """The whole frame at once: `rgb` of it."""
@@ -378,6 +379,8 @@ class FrameRenderer:
         return SpectralAxis.build(glasses) if own.glasses and glasses else own
 
 
-def _with_lights(stage: Stage) -> Stage:
+def _as_rendered(stage: Stage, settings: RenderSettings) -> Stage:
+    """With the lights of its panorama, and flat faces apart unless a whole object's map is asked for."""
     scene = with_panorama_lights(stage.scene)
+    scene = scene if settings.layer.startswith("map:") else with_flat_faces(scene)
     return stage if scene is stage.scene else replace(stage, scene=scene)

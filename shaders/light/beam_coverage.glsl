@@ -21,8 +21,9 @@ flat in vec4 edge[2 * EDGES];
 #define EDGE_COUNT int(band.w)
 #define EDGE_START(e) FETCHED(2 * (e))
 #define EDGE_CHANGE(e) FETCHED(2 * (e) + 1)
-#define EDGE_OF(list, i) i
-#define LISTED (crossings > 0 ? EDGE_COUNT : 0)
+#define IS_LISTED (EDGE_COUNT <= 16 && crossings <= 8)
+#define EDGE_OF(list, i) (IS_LISTED ? int(list & 15u) : i)
+#define LISTED (crossings == 0 ? 0 : IS_LISTED ? crossings : EDGE_COUNT)
 #endif
 
 vec2 at;  // the texel's centre, about the anchor
@@ -85,8 +86,7 @@ vec3 line_at(int e, float t) {
     return normalized_line(vec3(line.xy, dot(line.xy, at) + line.z), line.w);
 }
 
-// The edges that cross the texel at some time, four bits each; where a program takes any number of edges it looks at
-// all again.
+// The edges that cross the texel at some time, four bits each; where that is too little all are looked at again.
 uint crossing;
 int crossings;
 // One of them: normal, distance inside, window; and their change over the band. Where none crosses, one that all of the
@@ -141,6 +141,6 @@ float half_plane_share(float t) {
 void note_crossing(int e, bool crosses, vec4 start, vec4 change) {
     only_start = crosses ? start : only_start;
     only_change = crosses ? change : only_change;
-    if (EDGES > 0) crossing = crosses ? crossing << 4 | uint(e) : crossing;
+    crossing = crosses ? crossing << 4 | uint(e) : crossing;
     crossings += crosses ? 1 : 0;
 }

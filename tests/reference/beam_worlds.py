@@ -72,7 +72,7 @@ class Rig:
     def find(self, emission: Emission, threshold: float, seed: int = 1, depth: int = 64, drift: float = 1.0):
         """(leaves, sums) of one source."""
         how = Search(threshold, seed, depth, 0.25 * self.texel, drift)
-        leaves, sums, blocked = search(self.beams, emission, how, 2)
+        [(leaves, sums, blocked)] = search(self.beams, [(emission, how)], 2)
         assert not blocked
         return leaves, sums
 

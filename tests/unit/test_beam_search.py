@@ -36,7 +36,8 @@ def stone() -> tuple[BeamScene, Emission]:
 
 
 def fluxes(stone: tuple[BeamScene, Emission], seed: int, threads: int) -> tuple[np.ndarray, np.ndarray]:
-    leaves, sums, blocked = search(*stone, Search(1e-3, seed, 96, 1e-3), threads)
+    beams, emission = stone
+    [(leaves, sums, blocked)] = search(beams, [(emission, Search(1e-3, seed, 96, 1e-3))], threads)
     assert not blocked
     return np.concatenate([part.leaf["flux"] for part in leaves]), sums
 
@@ -104,7 +105,7 @@ def test_light_that_is_caught_in_a_tinted_pane_ends_finite(tmp_path: Path, kind:
     beams = beam_scene(scene, meshes, {0: (np.zeros(3), np.eye(3)[:2])}, axis, 1.0)
     beams.facets["texel"] = 1e-3
     for emission in emissions(scene.lights[0], beams, lambda p: np.asarray(p, float), 1.0, axis, 1):
-        found = Leaves.joined(search(beams, emission, Search(1e-5, 1, 96, 1e-3))[0]).leaf
+        found = Leaves.joined(search(beams, [(emission, Search(1e-5, 1, 96, 1e-3))])[0][0]).leaf
         assert len(found) and (found["density"][:, 1] < 1e-300).any()
         assert np.isfinite(found["slope"]).all() and np.isfinite(found["density"]).all()
 
@@ -124,7 +125,7 @@ def test_seeds_next_to_each_other_play_other_roulettes(stone: tuple[BeamScene, E
 
 
 def test_leaves_keep_their_own_edges_and_corners(stone: tuple[BeamScene, Emission]) -> None:
-    every = Leaves.joined(search(*stone, Search(1e-3, 1, 96, 1e-3), 1)[0])
+    every = Leaves.joined(search(stone[0], [(stone[1], Search(1e-3, 1, 96, 1e-3))], 1)[0][0])
     keep = np.arange(len(every.leaf)) % 3 == 1
     some = every.where(keep)
     for name, rows, kept in (("edges", every.edge, some.edge), ("corners", every.corner, some.corner)):
@@ -223,11 +224,11 @@ def test_penumbrae_of_a_far_window_are_as_wide_as_it_is_seen() -> None:
     strongest = int(found.leaf["flux"].argmax())
     edges = found.edge[found.leaf["edges"][:strongest].sum() :][: found.leaf["edges"][strongest]]
     across = np.abs(edges["line"][:, 1, :2] @ rig.beams.facets["frame"][found.leaf["facet"][strongest], 1:])[:, 1] > 0.9
-    # A part is all of the lamp's width and a sixteenth of its length; its light falls slantwise from a height of 1.
+    # A part is half of the lamp's width and an eighth of its length; its light falls slantwise from a height of 1.
     slant = np.hypot(600.0, 1800.0) / 1800.0
     assert len(parts) == 16 and across.any() and not across.all()
-    assert edges["soft"][across] == pytest.approx(20.0 / 1897.4 * slant, rel=0.05)
-    assert edges["soft"][~across] == pytest.approx(200.0 / 16.0 / 1897.4 * slant**2, rel=0.05)
+    assert edges["soft"][across] == pytest.approx(10.0 / 1897.4 * slant, rel=0.05)
+    assert edges["soft"][~across] == pytest.approx(200.0 / 8.0 / 1897.4 * slant**2, rel=0.05)
 
 
 def test_a_box_ends_beams_and_its_light_is_left_to_photons() -> None:

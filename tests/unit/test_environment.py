@@ -321,6 +321,18 @@ def test_the_sun_of_a_panorama_is_found_where_it_stands(azimuth_deg: float) -> N
     np.testing.assert_allclose(left + xyz_to_rgb709(light.spectral_power.xyz()), whole, rtol=4e-3)
 
 
+def test_lights_at_the_pole_are_whole() -> None:
+    """All columns meet there: a sun beside it was two, and a round lamp about it lost 3 % of its light."""
+    (light,), _ = lights_of(sunny(89.7, 0.0, radius_deg=0.6))
+    assert np.dot(light.direction, (0.0, 0.0, -1.0)) > math.cos(math.radians(0.5))
+    panorama = sunny(90.0, 0.0, radius_deg=3.0)
+    (lamp,), rest = lights_of(panorama)
+    edges = np.cos(np.pi * np.arange(257) / 256)
+    whole, left = (((edges[:-1] - edges[1:]) @ e.rgb.sum(axis=1) * 2.0 * np.pi / 512) for e in (panorama, rest))
+    assert isinstance(lamp, PanoramaWindow) and lamp.is_disc
+    np.testing.assert_allclose(left + lamp.solid_angle_sr * lamp.radiance, whole, rtol=1e-5)
+
+
 def test_wide_glows_and_weak_spots_are_no_lights() -> None:
     assert lights_of(sunny(35.0, 10.0, radius_deg=14.0))[0] == ()
     assert lights_of(sunny(35.0, 10.0, sun=15.0))[0] == ()

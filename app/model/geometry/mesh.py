@@ -285,6 +285,27 @@ def convex_planes_of(mesh: Mesh, most: int = MAX_CONVEX_PLANES) -> np.ndarray | 
     return _frozen(np.array(planes))
 
 
+def coplanar(mesh: Mesh, most: int) -> list[np.ndarray] | None:
+    """Triangles by the plane that they lie in and face, the largest first; None where there are more than `most`
+    planes. Slivers that lie in none of them are left out."""
+    areas, normals, corners = mesh.areas(), mesh.face_normals(), mesh.corners()
+    corners = corners - 0.5 * np.add(*mesh.bounds())
+    tolerance = _COPLANAR_TOLERANCE * float(np.linalg.norm(np.subtract(*mesh.bounds())))
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    is_sliver = areas <= 0.5 * tolerance * longest
+    found, left = list[np.ndarray](), np.argsort(-areas, kind="stable")
+    while not is_sliver[left].all():
+        first = left[~is_sliver[left]][0]
+        beyond = np.abs((corners[left] - corners[first].mean(axis=0)) @ normals[first]).max(axis=1)
+        together = (beyond <= tolerance) & (is_sliver[left] | (normals[left] @ normals[first] >= _COPLANAR_COSINE))
+        together[left == first] = True
+        if len(found) == most:
+            return None
+        found.append(np.sort(left[together]))
+        left = left[~together]
+    return found
+
+
 def note_recipe(mesh: Mesh, recipe: Mapping[str, Any]) -> None:
     """Remember the scene-file keys that make `mesh`."""
     object.__setattr__(mesh, "recipe", dict(recipe))
