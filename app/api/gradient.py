@@ -48,6 +48,8 @@ class Gradient:
     """float64 (bins + 1,), rising."""
     step: float
     """Change of the parameter to either side by which it was found."""
+    noise: float
+    """Standard deviation of `rgb` by chance, over its norm: of single texels; means over several are less noisy."""
     placement: Mapping[str, object] | None
     """Where a map lies, see `CausticMap.placement`."""
     seconds: float
@@ -76,7 +78,8 @@ class Gradient:
 
     def __repr__(self) -> str:
         height, width, _ = self.rgb.shape
-        return f"Gradient('{self.of}', {width}×{height}, step {self.step:.3g}, {self.seconds:.1f} s)"
+        found = f"step {self.step:.3g}, noise {100.0 * self.noise:.2g} %"
+        return f"Gradient('{self.of}', {width}×{height}, {found}, {self.seconds:.1f} s)"
 
 
 def solved(steps: Generator[float, None, T], report: Callable[[float, str], None], stopped: Callable[[], bool]) -> T:
@@ -120,7 +123,9 @@ def gradients(
         from ..render.gradient import gradient
 
         given = dict.fromkeys(of, float(step)) if step is not None else None
-        found = solved(gradient(context, Stage(model, model.camera), settings, list(of), given), report, stopped)
+        found = solved(
+            gradient(context, Stage(model, model.camera), settings, list(of), given, noise=True), report, stopped
+        )
         base, seconds = found.base, time.perf_counter() - started
         return [
             Gradient(
@@ -131,6 +136,7 @@ def gradients(
                 base.spectral,
                 base.bin_edges_nm,
                 each.step,
+                each.noise,
                 found.placement,
                 seconds,
             )

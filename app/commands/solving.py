@@ -48,7 +48,7 @@ def gradient(options: Gradient) -> int:
         settings = replace(settings, layer=f"map:{options.receiver}")
     steps = None if options.step is None else {options.of: options.step}
     started = time.perf_counter()
-    found = _run(scene, "deriving", lambda context: derived(context, stage, settings, [options.of], steps))
+    found = _run(scene, "deriving", lambda context: derived(context, stage, settings, [options.of], steps, noise=True))
     if found is None:
         return INTERRUPTED
     its = found.derivatives[0]
@@ -59,7 +59,8 @@ def gradient(options: Gradient) -> int:
             options.output, its.picture.rgb, spectral=its.picture.spectral, bin_edges_nm=its.picture.bin_edges_nm
         )
     took = time.perf_counter() - started
-    show(f"{options.output.resolve()}: derivative by {its.path}, step {its.step:.3g} to either side, in {took:.1f} s")
+    how = f"step {its.step:.3g} to either side, noise {100.0 * its.noise:.2g} % of it"
+    show(f"{options.output.resolve()}: derivative by {its.path}, {how}, in {took:.1f} s")
     return 0
 
 

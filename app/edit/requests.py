@@ -198,7 +198,8 @@ class Animate(Request):
 
 @dataclass(frozen=True)
 class MatchGlass(Request):
-    """Find the catalogue's glasses whose light is nearest to what object `index` casts now, or to what is wanted."""
+    """Find the catalogue's glasses whose light is nearest to what object `index` casts now, or to what is wanted; or
+    numbers `of` the scene (paths of `edit.parameters`) with which it casts that."""
 
     index: int
     file: Path | None = None
@@ -207,6 +208,7 @@ class MatchGlass(Request):
     """… or a width …"""
     between: tuple[Vec3, ...] = ()
     """… there: two ends of a line or three corners, world; of the light as it is, empty for the first flat receiver."""
+    of: tuple[str, ...] = ()
     photons: int = 100_000
     """Of each glass that is tried."""
 

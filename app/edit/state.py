@@ -96,6 +96,8 @@ class Solve:
     """Of a glass: the light as it is, a picture where the ruler lies, or a width along it."""
     file: Path | None = None
     width: float = 0.0
+    with_glass: bool = False
+    """Whether n_d and V_d are fitted with `parameter`."""
     plate_target: Path | None = None
     plate_distance: float = 0.0
     """0: where it is most like."""

@@ -25,6 +25,8 @@ _GROWTH = 0.1
 """By which the error may grow within the tolerances."""
 _SCAN = np.geomspace(0.5, 32.0, 13)
 """Distances that are tried where none is given, widths of the plate."""
+_TOLD = 0.9
+"""Correlation below which other turns may be as like."""
 _MOST_TILT_DEG = 40.0
 _EITHER_WAY = 0.005
 """Correlation by which the picture must be better with the shaped side to the light."""
@@ -79,13 +81,15 @@ class PlateReport:
         """What it found, in words."""
         quarter, mirrored = self.fit.turn % 4, "mirrored, " if self.fit.turn >= 4 else ""
         sides = ("flat", "shaped") if self.flat_first else ("shaped", "flat")
-        turned = f"turned by {90 * quarter}° counter-clockwise" if quarter else "upright"
+        turned = mirrored + (f"turned by {90 * quarter}° counter-clockwise" if quarter else "upright")
+        if self.fit.correlation < _TOLD:
+            turned = "too unlike the target there to tell how it is turned"
         known = [each for each in (self.nearer, self.farther, self.tilt_deg) if math.isfinite(each)]
         held = f"{self.nearer:.4g} nearer to {self.farther:.4g} farther, {self.tilt_deg:.3g}° of tilt"
         return (
             ("plate", f"{self.plate.size[0]:.5g} × {self.plate.size[1]:.5g}, {self.plate.thickness:.4g} thick"),
             ("shaped side", f"{self.plate.side}; picture with the {sides[0]} side to the light"),
-            ("picture", f"{mirrored}{turned}, {self.width:.5g} wide, seen from the plate"),
+            ("picture", f"{turned}, {self.width:.5g} wide, seen from the plate"),
             ("distance", f"{self.distance:.5g}; most like the target at {self.focal_distance:.5g}"),
             (
                 "error",

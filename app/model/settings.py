@@ -74,6 +74,8 @@ class RenderSettings:
     """Whether the dispersion brush's dabs count; False is the physical picture."""
     editable: bool = False
     """Photons are kept and drawn again when dispersion and lights are edited: in the viewer."""
+    least_bands: int = 1
+    """Spectral bands of photons, at least: for derivatives, of which bands too wide leave more than of a picture."""
     any_view: bool = False
     """The camera may go anywhere (viewer, animation): what a scene needs is not judged by what its camera sees."""
     tally: bool = False

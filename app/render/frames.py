@@ -124,7 +124,8 @@ class FrameRenderer:
         self._settings = settings = replace(settings, any_view=settings.any_view or moves)
         self._fit = FrameFit.of(stages, settings)
         self._unsurveyed = list(stages_to_survey(stages, settings))
-        self._window = window
+        self.window = window
+        """Of a map, once one was rendered."""
         self.traced: Traced | None = None
         """Light and passes of the last frame."""
         self._budget: TimeBudget | None = None
@@ -160,7 +161,7 @@ class FrameRenderer:
         self.traced = self._made(stage, inputs_of(stage, self._settings))
         for _ in self.traced.light.preparing():
             yield 0.0
-        self._window = self.traced.light.map_window
+        self.window = self.traced.light.map_window
         self.seconds.prepare = time.perf_counter() - self.seconds.started
 
     def _trace(self, stage: Stage, stop: Stop) -> Iterator[float]:
@@ -362,7 +363,7 @@ class FrameRenderer:
         scene = scene_seen(stage.scene, stage.camera, stage.solo_nm)
         features = Features.of(scene, settings)
         buffers = SceneBuffers(self._context.ctx, scene, features, self._axis(scene, features))
-        fit, division = replace(self._fit.maps(scene.camera), window=self._window), self._fit.division
+        fit, division = replace(self._fit.maps(scene.camera), window=self.window), self._fit.division
         light = LightPass(self._context, scene, settings, features, buffers, fit=fit, division=division)
 
         def look_at_memory(layout: MapLayout) -> None:

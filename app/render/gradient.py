@@ -2,7 +2,8 @@
 
 Each is the difference of two pictures over twice a small step. Both have the same random numbers, the same lattices of
 light and the same texels: what does not depend on the parameter is the same in both to the bit, and what does changes
-smoothly, so that chance, which would be divided by the step, drops out.
+smoothly, so that chance, which would be divided by the step, drops out. What remains of it is told by two halves of the
+photons.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from ..gpu.context import Context
 from ..model.settings import RenderSettings
 from .bake import placement
 from .frames import FrameRenderer, Picture
+from .sampling import CameraSampling
 
 INDEX = "index"
 """Parameter of an object of glass: n(λ), raised alike at all wavelengths."""
@@ -28,6 +30,11 @@ _CHANGE, _LEAST_CHANGE, _MOST_CHANGE = 0.03, 0.01, 0.08
 derivative."""
 _LARGEST, _TRIES, _TRIED = 8.0, 3, 1 << 15
 """A step over the first one at most; pictures by so many photons until it is found."""
+_BANDS, _PHOTONS_A_BAND = 16, 1 << 13
+"""Spectral bands: within one, footprints are as broad as at its middle. That misses little of a picture, and much of
+what dispersion changes in a focus."""
+_OTHER_HALF = 1 << 31
+"""Seed of the second half of the photons, over the first one's."""
 
 
 @dataclass(frozen=True)
@@ -38,6 +45,8 @@ class Derivative:
     picture: Picture
     step: float
     """The parameter's change to either side."""
+    noise: float
+    """Standard deviation of `picture.rgb` by chance, as a share of its norm; NaN where it was not asked for."""
 
 
 @dataclass(frozen=True)
@@ -57,37 +66,68 @@ def gradient(
     paths: Sequence[str],
     steps: Mapping[str, float] | None = None,
     window: np.ndarray | None = None,
+    *,
+    noise: bool = False,
 ) -> Generator[float, None, Gradient]:
     """Of what `settings.layer` shows, by each of `paths` (`edit.parameters`, and `INDEX`), pausing with the share done.
 
-    `steps`: of parameters; those of others are found by a few photons. `window`: `MapFit.window` of a map. Raises
-    `UserError`."""
+    `steps`: of parameters; those of others are found by a few photons. `window`: `MapFit.window` of a map. `noise`: by
+    two halves of the photons and of the camera's samples, whose difference says it. Raises `UserError`."""
     for path in paths:
         check_path(stage, path)
-    few = replace(settings, photons=min(settings.photons or stage.scene.render.photons, _TRIED), seconds=None, spp=1)
+    photons = settings.photons or stage.scene.render.photons
+    few = _with_bands(replace(settings, photons=min(photons, _TRIED), seconds=None, spp=1))
+    halves = [_with_bands(replace(settings, photons=photons))]
+    if noise:
+        spp = max(1, CameraSampling.of(settings).budget // 2)
+        first = _with_bands(replace(settings, photons=max(1, photons // 2), spp=spp))
+        halves = [first, replace(first, seed=(settings.seed + _OTHER_HALF) & 0xFFFFFFFF)]
     found: list[Derivative] = []
     base, where = None, None
     for number, path in enumerate(paths):
         h = (steps or {}).get(path) or (yield from mapped(_step(context, stage, few, path, window), lambda share: 0.0))
-        either = [nudged(stage, path, -h), nudged(stage, path, h)]
-        renderer = FrameRenderer(context, settings, either, window=window)
-        try:
-            drawn: list[Picture] = []
-            for one in (*either, stage)[: 3 if base is None else 2]:
-                for share in renderer.steps(one):
-                    yield (number + (len(drawn) + share) / 3.0) / len(paths)
-                drawn.append(renderer.picture)
-            if base is None:
-                base = drawn[2]
-                where = placement(renderer.light) if settings.layer.startswith("map:") else None
-        finally:
-            renderer.release()
-        low, high, spectral = drawn[0], drawn[1], None
-        if high.spectral is not None and low.spectral is not None:
-            spectral = (high.spectral - low.spectral) / (2.0 * h)
-        found.append(Derivative(path, Picture((high.rgb - low.rgb) / (2.0 * h), spectral, high.bin_edges_nm), h))
+        drawn: list[list[Picture]] = []
+        for half in halves:
+            either = sides(stage, path, h)
+            renderer = FrameRenderer(context, half, either, window=window)
+            wanted = (*either, stage)[: 3 if base is None else 2]
+            drawn.append([])
+            try:
+                for one in wanted:
+                    for share in renderer.steps(one):
+                        done = (len(drawn[-1]) + share) / len(wanted)
+                        yield (number + (len(drawn) - 1 + done) / len(halves)) / len(paths)
+                    drawn[-1].append(renderer.picture)
+                if where is None and settings.layer.startswith("map:"):
+                    where = placement(renderer.light)
+                window = window if renderer.window is None else renderer.window
+            finally:
+                renderer.release()
+        if base is None:
+            base = _mean([pictures[2] for pictures in drawn])
+        each = [_sum(low, high, -0.5 / h, 0.5 / h) for low, high, *_ in drawn]
+        its = _mean(each)
+        apart = float(np.linalg.norm(each[0].rgb - each[-1].rgb)) / 2.0 if noise else np.nan
+        found.append(Derivative(path, its, h, apart / max(float(np.linalg.norm(its.rgb)), 1e-300)))
     assert base is not None, "there are paths"
     return Gradient(base, tuple(found), where)
+
+
+def _with_bands(settings: RenderSettings) -> RenderSettings:
+    assert settings.photons is not None
+    return replace(settings, least_bands=int(np.clip(settings.photons // _PHOTONS_A_BAND, 1, _BANDS)))
+
+
+def _mean(pictures: Sequence[Picture]) -> Picture:
+    """Of one picture, or of two."""
+    return _sum(pictures[0], pictures[-1], 0.5, 0.5)
+
+
+def _sum(a: Picture, b: Picture, of_a: float, of_b: float) -> Picture:
+    spectral = None
+    if a.spectral is not None and b.spectral is not None:
+        spectral = (of_a * a.spectral + of_b * b.spectral).astype(np.float32)
+    return Picture((of_a * a.rgb + of_b * b.rgb).astype(np.float32), spectral, a.bin_edges_nm)
 
 
 def _step(
@@ -96,7 +136,7 @@ def _step(
     """A change of a parameter that changes the picture as much as it should."""
     first = h = first_step(stage, path)
     for _ in range(_TRIES):
-        either = [nudged(stage, path, -h), nudged(stage, path, h)]
+        either = sides(stage, path, h)
         renderer = FrameRenderer(context, settings, either, window=window)
         try:
             drawn = []
@@ -139,7 +179,20 @@ def first_step(stage: Stage, path: str) -> float:
     if field[0] == "position":
         points = np.concatenate([item.world_vertices for item in stage.scene.objects if item.material.is_specular])
         return 2e-3 * float(np.ptp(points, axis=0).max())
-    return 0.01 * (abs(value_of(stage, path)) or 1.0)
+    share = 0.02 if field[1] in ("V_d", "dispersion_gain") else 0.01
+    return share * (abs(value_of(stage, path)) or 1.0)
+
+
+def sides(stage: Stage, path: str, h: float) -> list[Stage]:
+    """`stage` at either side, about twice `h` apart: of V_d so that its reciprocal, dispersion, changes alike. Raises
+    `UserError` for what cannot change so much."""
+    low, high = -h, h
+    if path.endswith(".V_d"):
+        v_d = value_of(stage, path)
+        if not h < abs(v_d) < np.inf:
+            raise UserError(f"'{path}' is {v_d:g} and cannot change by {h:g} to either side")
+        low, high = (v_d / (1.0 - change / v_d) - v_d for change in (low, high))
+    return [nudged(stage, path, low), nudged(stage, path, high)]
 
 
 def nudged(stage: Stage, path: str, change: float) -> Stage:

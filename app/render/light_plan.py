@@ -194,7 +194,7 @@ class Planner:
             edges = axis.x_of_nm(edges_nm)
             middles = axis.x_of_nm(0.5 * (edges_nm[:-1] + edges_nm[1:]))
         else:
-            least = CRYSTAL_BANDS if self.features.crystals else 1
+            least = max(CRYSTAL_BANDS if self.features.crystals else 1, self.settings.least_bands)
             count = max(fit.band_count(), least) if divides_spectrum(method) and self.features.spectral_groups else 1
             ends = ends_of(self.scene.lights[light].spectral_power, axis)
             edges = np.linspace(*ends, count + 1)

@@ -1,5 +1,5 @@
-"""Jobs of the window that solve (which glass, a derivative, whether a plate draws its picture), and the pictures that
-they found, by the functions that the command line and Python use."""
+"""Jobs of the window that solve (which glass or number, a derivative, whether a plate draws its picture), and the
+pictures that they found, by the functions that the command line and Python use."""
 
 from __future__ import annotations
 
@@ -84,6 +84,7 @@ def solving_job(
 def _match(
     context: Context, request: requests.MatchGlass, state: State, notices: FrameNotices
 ) -> tuple[Words, Iterator[float]]:
+    from ..render.gradient import check_path
     from ..render.light_target import flat_receiver, read_target
     from ..render.solving import solution
 
@@ -94,11 +95,22 @@ def _match(
     wish = receiver, values, request.between or None, request.width
 
     def work() -> Iterator[float]:
+        if request.of:
+            fit = yield from solution(context, stage, settings, *wish, lambda its: its.fit(request.of))
+            sure = {path: f" ± {sd:.1g}" if np.isfinite(sd) else "" for path, sd in fit.deviations.items()}
+            notices.take(f"{path} {value:.6g}{sure[path]}" for path, value in fit.values.items())
+            notices.take([f"what is left differs by {100.0 * fit.error:.3g} %"])
+            return
         found = yield from solution(context, stage, settings, *wish, lambda its: its.match(request.index, 3))
         notices.take(
             f"{g.name} (n_d {g.n_d:.4f}, V_d {g.V_d:.1f}) differs by {100.0 * g.error:.2g} %" for g in found.glasses
         )
 
+    if request.of:
+        for path in request.of:
+            check_path(stage, path)
+        words = "Fit of " + ", ".join(request.of), f"Numbers that light '{receiver}' so:", "Nothing was fitted."
+        return Words(*words), work()
     name = scene.objects[request.index].name
     lit = f"Glasses that light '{receiver}' most alike:"
     return Words(f"Glass of {name}", lit, "No glass was looked for any more."), work()
@@ -118,8 +130,12 @@ def _derive(
     of = state.scene, state.camera, request.path
 
     def work() -> Iterator[float]:
-        its = (yield from gradient(context, stage, settings, [request.path])).derivatives[0]
-        rows = (("By", its.path), ("Step", f"{its.step:.3g} to either side"))
+        its = (yield from gradient(context, stage, settings, [request.path], noise=True)).derivatives[0]
+        rows = (
+            ("By", its.path),
+            ("Step", f"{its.step:.3g} to either side"),
+            ("Noise", f"{100.0 * its.noise:.2g} % of it"),
+        )
         found.keep("derivative", Found(of, rows, signed_codes(its.picture.rgb)))
 
     words = f"Derivative by {request.path}", "The derivative is in the Solve panel.", "No derivative was found."

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import spectrasplat as ss
 from scipy.ndimage import gaussian_filter
+from spectrasplat.base.errors import UserError
 from spectrasplat.base.generators import finished
 from spectrasplat.edit.glass import bent
 from spectrasplat.edit.parameters import Stage
@@ -17,7 +19,7 @@ from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.frames import FrameRenderer
-from spectrasplat.render.gradient import Gradient, gradient, nudged
+from spectrasplat.render.gradient import Gradient, gradient, sides
 
 BALL = """
 [[lights]]
@@ -44,8 +46,8 @@ def settings(photons: int, receiver: str = "table", seed: int = 1, bins: int | N
     return RenderSettings(width=48, height=48, photons=photons, seed=seed, bins=bins, layer=f"map:{receiver}")
 
 
-def gradient_of(gl, scene: Scene, path: str, its: RenderSettings) -> Gradient:
-    return finished(gradient(gl, Stage(scene, scene.camera), its, [path]))
+def gradient_of(gl, scene: Scene, path: str, its: RenderSettings, *, noise: bool = False) -> Gradient:
+    return finished(gradient(gl, Stage(scene, scene.camera), its, [path], noise=noise))
 
 
 def difference(gl, scene: Scene, path: str, found: Gradient, its: RenderSettings) -> np.ndarray:
@@ -53,8 +55,8 @@ def difference(gl, scene: Scene, path: str, found: Gradient, its: RenderSettings
     stage, step = Stage(scene, scene.camera), found.derivatives[0].step
     corners = found.placement["corners_world"]
     window = np.array([corners["bottom_left"], corners["top_right"]])
-    either = [nudged(stage, path, -step), nudged(stage, path, step)]
-    frames = FrameRenderer(gl, its, either, window=window)
+    either = sides(stage, path, step)
+    frames = FrameRenderer(gl, replace(its, least_bands=16), either, window=window)
     try:
         low, high = [frames.run(each).astype(float) for each in either]
     finally:
@@ -75,11 +77,26 @@ def loaded(tmp_path: Path) -> Scene:
 
 @pytest.mark.parametrize("path", ["objects.ball.n_d", "objects.ball.position.x"])
 def test_of_a_ball(gl, tmp_path: Path, path: str) -> None:
-    """Within 2 % of the norm by 60,000 photons, most of which is what the other numbers' lattice differs by."""
+    """Within 4 % of the norm by 60,000 photons, most of which is chance of both."""
     scene = loaded(tmp_path)
     found = gradient_of(gl, scene, path, settings(60_000))
     expected = difference(gl, scene, path, found, settings(120_000, seed=7))
-    assert relative(found.derivatives[0].picture.rgb, expected, 1.0) < 0.02
+    assert relative(found.derivatives[0].picture.rgb, expected, 1.0) < 0.04
+
+
+@pytest.mark.slow
+def test_by_dispersion_no_band_is_too_wide(gl, tmp_path: Path) -> None:
+    """Against wavelengths at random, which know no bands: within 0.15, of which both have some 0.05 by chance; with the
+    bands of a picture it is 0.3. Another seed differs by as much as is said."""
+    scene, path = loaded(tmp_path), "objects.ball.V_d"
+    found, other = (gradient_of(gl, scene, path, settings(120_000, seed=seed), noise=True) for seed in (1, 2))
+    at_random = replace(settings(400_000, seed=7), method="stochastic-even")
+    mine, theirs = (each.derivatives[0] for each in (found, other))
+    assert relative(mine.picture.rgb, difference(gl, scene, path, found, at_random), 1.0) < 0.15
+    apart = relative(mine.picture.rgb, theirs.picture.rgb, 0.0) / 2.0**0.5
+    assert 0.5 * apart < mine.noise < 2.0 * apart
+    with pytest.raises(UserError, match="cannot change by"):
+        sides(Stage(scene, scene.camera), path, 100.0)
 
 
 def test_what_photons_weigh_changes_too(gl, tmp_path: Path) -> None:

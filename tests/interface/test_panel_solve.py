@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import spectrasplat as ss
 from reference.caustic_plates import picture, plate
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import write_image
@@ -57,6 +58,10 @@ def test_what_is_wanted_is_asked_for(gl: Context) -> None:
         rig.frame(2)
         rig.click("Find the glass of prism")
         assert rig.state.requests == (MatchGlass(0, None, 0.2, line),)
+        rig.state = replace(rig.state, requests=(), solve=replace(rig.state.solve, parameter="objects.prism.V_d"))
+        rig.frame(2)
+        rig.click("Fit objects.prism.V_d")
+        assert rig.state.requests == (MatchGlass(0, None, 0.2, line, ("objects.prism.V_d",)),)
 
 
 def test_a_plate_is_checked_in_the_window(gl: Context, tmp_path: Path) -> None:
@@ -101,6 +106,27 @@ def test_a_derivative_is_found_in_the_window(gl: Context) -> None:
     assert red.max() > 100 and blue.max() > 100
     with pytest.raises(UserError, match="changes no light"):
         exports.begin(Derive("camera.position.x"), state, shown)
+    exports.release()
+
+
+def test_a_number_is_fitted_in_the_window(gl: Context, tmp_path: Path) -> None:
+    """By the colours that a prism of a known V_d casts; one that changes no light is refused at once."""
+    true = ss.load("spectrum")
+    true.objects["prism"].update(glass=None, material={"n_d": 1.80, "V_d": 20.0})
+    found = ss.caustic(true, "screen", size=(64, 64), photons=8192)
+    corners = tuple(tuple(found.placement["corners_world"][at]) for at in ("top_left", "top_right", "bottom_left"))
+    write_image(tmp_path / "wanted.npy", found.rgb)
+    ask = MatchGlass(0, tmp_path / "wanted.npy", None, corners, ("objects.prism.V_d",), 8192)
+    start = true.copy()
+    start.objects["prism"].update(material={"n_d": 1.80, "V_d": 22.0})
+    state = State(start._model, start._model.camera, viewport_size=(48, 27))
+    exports = Exports(gl)
+    shown = Shown(None, None, 0.0, 0)  # type: ignore[arg-type]
+    exports.begin(ask, state, shown)
+    note = finished(exports)
+    assert float(note.split("objects.prism.V_d ")[1].split()[0]) == pytest.approx(20.0, abs=0.5)
+    with pytest.raises(UserError, match="changes no light"):
+        exports.begin(replace(ask, of=("camera.position.x",)), state, shown)
     exports.release()
 
 

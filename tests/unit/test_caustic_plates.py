@@ -85,6 +85,14 @@ def test_a_plate_is_checked_against_its_target(tmp_path: Path, shaped: str) -> N
         assert dict(mirrored.rows())["tolerance"].startswith("not measured")
 
 
+def test_how_a_blurred_picture_is_turned_is_not_said() -> None:
+    """Far from its focus other turns are as like."""
+    made = plate(DISTANCE, PMMA.n_d, resolution=61)
+    for distance, is_said in ((DISTANCE, True), (3.0 * DISTANCE, False)):
+        found = check_plate(made, PMMA, picture(), distance, cancelled=lambda: True)
+        assert ("too unlike" not in dict(found.rows())["picture"]) is is_said
+
+
 @pytest.mark.parametrize(
     "mesh, words",
     [

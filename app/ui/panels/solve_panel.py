@@ -1,4 +1,5 @@
-"""What solves by derivatives: the picture's derivative by a number of the scene, and which glass casts a light."""
+"""What solves by derivatives: the picture's derivative by a number of the scene, and which glass or number casts a
+light."""
 
 from __future__ import annotations
 
@@ -86,10 +87,27 @@ def _glass(state: State, view_model: ViewModel) -> State:
     if missing:
         widgets.hint(_WANTED_TIPS[wanted])
     ready = not missing and view_model.job is None and not item.material.is_crystal
+    between = () if wanted == "light" else state.measured[: 2 if wanted == "width" else 3]
+    ask = MatchGlass(index, file, solve.width if wanted == "width" else None, between)
     if widgets.button(f"Find the glass of {item.name}###find", tip="Rank the catalogue.", enabled=ready, width=-1):
-        between = () if wanted == "light" else state.measured[: 2 if wanted == "width" else 3]
-        width = solve.width if wanted == "width" else None
-        state = state.asking(MatchGlass(index, file, width, between))
+        state = state.asking(ask)
+    return state if wanted == "light" else _numbers(state, view_model, ask, ready=not missing)
+
+
+def _numbers(state: State, view_model: ViewModel, ask: MatchGlass, *, ready: bool) -> State:
+    """The row that fits the number that is chosen for the derivative, of a picture with n_d and V_d."""
+    solve, name = state.solve, state.scene.objects[ask.index].name
+    of: tuple[str, ...] = (solve.parameter,)
+    if ask.width is None:
+        tip = "Of this glass, all at once. A picture tells them apart, a width does not."
+        solve = replace(solve, with_glass=widgets.toggle("n_d, V_d too", solve.with_glass, tip=tip))
+    if ask.width is None and solve.with_glass:
+        of = tuple(dict.fromkeys((*of, f"objects.{name}.n_d", f"objects.{name}.V_d")))
+    tip = "From its present value on, by derivatives. The number is that chosen under 'Derivative by'."
+    ready = ready and bool(of[0]) and view_model.job is None
+    state = replace(state, solve=solve)
+    if widgets.button(f"Fit {of[0] or 'a number'}###fit", tip=tip, enabled=ready, width=-1):
+        state = state.asking(replace(ask, of=of))
     return state
 
 
