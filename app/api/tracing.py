@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..base.errors import UserError
 from ..edit.stored_photons import StoredPhotons
+from ..model.naming import place_of
 from .arguments import Count, check_scene
 from .device import Cancel, Device, Progress
 from .scene import Scene
@@ -83,10 +84,10 @@ def fan(
     """
     check_scene(scene)
     model = scene._model
-    placed = _number([item.name for item in model.objects], through, f"scene '{model.name}' has no object")
+    placed = place_of(through, [item.name for item in model.objects], f"scene '{model.name}' has no object")
     source = None
     if light is not None:
-        source = _number([item.name for item in model.lights], light, f"scene '{model.name}' has no light")
+        source = place_of(light, [item.name for item in model.lights], f"scene '{model.name}' has no light")
     nm = np.asarray(wavelengths_nm, np.float64).reshape(-1)
     if isinstance(rays, bool) or not isinstance(rays, int) or not 1 <= rays * max(len(nm), 1) <= MAX_RAYS:
         raise UserError(f"rays {rays!r} times {len(nm)} wavelengths is out of range: give 1 to {MAX_RAYS} in all")
@@ -121,13 +122,3 @@ def fan(
 
     with Device() as device:
         return device.run(work)
-
-
-def _number(names: list[str], name: str, sentence: str) -> int:
-    from ..base.errors import suggestion
-
-    if name not in names:
-        listed = ", ".join(f"'{known}'" for known in names) or "none"
-        hint = suggestion(name, names) if isinstance(name, str) else ""
-        raise UserError(f"{sentence} {name!r}{hint}; it has {listed}")
-    return names.index(name)

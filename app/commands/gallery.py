@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.errors import UserError, suggestion
-from ..base.interrupts import interrupt_flag
+from ..base.interrupts import Interruption, interrupt_flag
 from ..base.paths import assets_dir, shipped_scenes
 from ..base.version import __version__
+from .bake import finished
 from .printing import note
 from .table import Gallery
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
-    from ..render.page.page import Page
 
 _MADE = "made.json"
 _MAKERS = (assets_dir() / "page", Path(__file__).parents[1] / "render" / "page")
@@ -63,19 +62,16 @@ def gallery(options: Gallery) -> int:
     with create_context() as context, interrupt_flag() as interrupted, ProgressReporter("gallery") as progress:
         for number, entry in enumerate(todo):
 
-            def report(share: float, done: int = number, name: str = entry.name) -> None:
+            def report(share: float, name: str, done: int = number) -> None:
                 progress((done + share) / len(todo), name)
 
             found = _make(context, entry, options, folder, report, interrupted)
-            if interrupted():
-                break
+            if found is None:
+                return interrupted.exit_code
             made[entry.page] = found | {"key": _key(entry, options)}
             with atomic_output(folder / _MADE) as temporary:
                 temporary.write_text(json.dumps(made, indent=1, ensure_ascii=False), encoding="utf-8")
             _write_index(folder, made, documents)
-    if interrupted():
-        print("spectrasplat: the same command goes on with what is missing", file=sys.stderr)
-        return interrupted.exit_code
     print(f"{folder.resolve()}: {sum(bool(m['page']) for m in made.values())} pages; open index.html, or upload it all")
     return 0
 
@@ -116,10 +112,10 @@ def _make(
     entry: _Entry,
     options: Gallery,
     folder: Path,
-    report: Callable[[float], None],
-    interrupted: Callable[[], bool],
-) -> dict[str, Any]:
-    """A page and its picture; what the list says of them."""
+    report: Callable[[float, str], None],
+    interrupted: Interruption,
+) -> dict[str, Any] | None:
+    """A page and its picture; what the list says of them, None where it was interrupted."""
     from ..edit.parameters import Stage
     from ..model.io.scene_file import load_scene
     from ..model.settings import RenderSettings
@@ -137,16 +133,12 @@ def _make(
     steps = page_steps(context, Stage(scene, scene.camera), settings, None, words)
     card = {"part": entry.part, "title": words.title, "words": "", "picture": None, "page": None}
     try:
-        while True:
-            report(next(steps))
-            if interrupted():
-                steps.close()
-                return card
-    except StopIteration as finished:
-        page: Page = finished.value
+        page = finished(steps, report, entry.name, interrupted, "the same command goes on with what is missing")
     except UserError as error:
         note(f"{entry.name}: {error}")
         return card | {"words": str(error)}
+    if page is None:
+        return None
     picture = Path(entry.page).with_suffix(".jpg").as_posix()
     page.to_html(folder / entry.page)
     (folder / picture).write_bytes(np.asarray(page.arrays["still"]).tobytes())

@@ -11,8 +11,6 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import UserError, suggestion
-from .geometry.mesh import note_recipe
-from .geometry.primitives import plane
 from .geometry.primitives_lens import vertices_of
 from .lights.light import DEFAULT_ILLUMINANCE
 from .lights.outlined import CollimatedLight
@@ -91,9 +89,7 @@ def _screen(at: float, side: float) -> SceneObject:
     matrix = np.eye(4)
     matrix[:3, :3] = _ALONG_X @ np.diag([1.0, -1.0, -1.0])  # facing the lens
     matrix[0, 3] = at
-    mesh = plane(side, side, name="screen")
-    note_recipe(mesh, {"shape": "plane", "width": side, "height": side})
-    return SceneObject("screen", mesh, Diffuse((0.5, 0.5, 0.5)), matrix)
+    return SceneObject("screen", make_shape("plane", width=side, height=side), Diffuse((0.5, 0.5, 0.5)), matrix)
 
 
 def _elements(lens: Lens, notes: list[str]) -> list[tuple[float, Surface, Surface, float]]:

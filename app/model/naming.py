@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ..base.errors import UserError, suggestion
+
 
 class Names(set[str]):
     """Names that are taken: of a file that repeats a name, later ones are numbered."""
@@ -28,6 +30,14 @@ def listed(names: Sequence[str], most: int = 6) -> str:
     """Names for a sentence, the first `most` of them."""
     shown = ", ".join(f"'{name}'" for name in names[:most])
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+
+
+def place_of(name: str, names: Sequence[str], sentence: str) -> int:
+    """Of `name` among `names`. Raises `UserError`, which begins with `sentence`, as "scene 'a' has no object"."""
+    if name not in names:
+        hint = suggestion(name, names) if isinstance(name, str) else ""
+        raise UserError(f"{sentence} {name!r}{hint or ';'} it has {listed(names) or 'none'}")
+    return names.index(name)
 
 
 class Unshown:

@@ -95,6 +95,12 @@ class SceneObject:
         """float64 (n, 3)."""
         return self.mesh.vertices @ self.object_to_world[:3, :3].T + self.object_to_world[:3, 3]
 
+    @property
+    def stretch(self) -> np.ndarray:
+        """float64 (3, 3): what its matrix does to the mesh before it is turned, symmetric."""
+        _, sizes, right = np.linalg.svd(self.object_to_world[:3, :3])
+        return right.T @ np.diag(sizes) @ right
+
 
 @dataclass(frozen=True)
 class RenderDefaults:

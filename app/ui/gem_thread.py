@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import threading
+from concurrent.futures import Future, ThreadPoolExecutor
+from threading import Event
 
 from ..base.errors import UserError, own_fault
 from ..base.not_yet import NOT_YET, NotYet
@@ -21,15 +22,15 @@ class GemThread:
     """One search at a time."""
 
     def __init__(self) -> None:
+        self._pool = ThreadPoolExecutor(1, "gem")
         self._item: SceneObject | None = None
-        self._reading: GemReading = NOT_YET
-        self._thread: threading.Thread | None = None
-        self._stopped = threading.Event()
+        self._found: Future[GemReading] | None = None
+        self._stopped = Event()
 
     @property
     def is_busy(self) -> bool:
         """The panel waits for figures."""
-        return self._thread is not None and self._thread.is_alive()
+        return self._found is not None and not self._found.done()
 
     def reading(self, state: State) -> GemReading:
         """Of the selected stone, or the scene's first; asked in every frame in which the panel is open."""
@@ -40,33 +41,23 @@ class GemThread:
             item = chosen_stone(state.scene, name)
         except UserError as error:
             return str(error)
-        if item is self._item:
-            return self._reading
-        self._reading = NOT_YET
-        if self.is_busy:
+        if item is not self._item or self._found is None:
             self._stopped.set()
-            return NOT_YET
-        self._item, self._stopped = item, threading.Event()
-        arguments = (item, state.scene, self._stopped)
-        self._thread = threading.Thread(target=self._find, args=arguments, name="gem", daemon=True)
-        self._thread.start()
-        return NOT_YET
+            self._item, self._stopped = item, Event()
+            self._found = self._pool.submit(_found, item.name, state.scene, self._stopped)
+        return self._found.result() if self._found.done() else NOT_YET
 
     def release(self) -> None:
         """Stop, and wait until then."""
         self._stopped.set()
-        if self._thread is not None:
-            self._thread.join()
+        self._pool.shutdown()
 
-    def _find(self, item: SceneObject, scene: Scene, stopped: threading.Event) -> None:
-        try:
-            found = figures(stone_in(scene, item.name), count=_COUNT, cancelled=stopped.is_set)
-            reading: GemReading = NOT_YET if found is None else (item.name, found)
-        except UserError as error:
-            reading = str(error)
-        except (ImportError, MemoryError, RuntimeError, ValueError, ArithmeticError, LookupError) as error:
-            reading = own_fault(f"the stone's figures could not be found ({type(error).__name__}: {error})")
-        if stopped.is_set():
-            self._item = None  # to be found again where somebody still asks
-        else:
-            self._reading = reading
+
+def _found(name: str, scene: Scene, stopped: Event) -> GemReading:
+    try:
+        found = figures(stone_in(scene, name), count=_COUNT, cancelled=stopped.is_set)
+        return NOT_YET if found is None else (name, found)
+    except UserError as error:
+        return str(error)
+    except (ImportError, MemoryError, RuntimeError, ValueError, ArithmeticError, LookupError) as error:
+        return own_fault(f"the stone's figures could not be found ({type(error).__name__}: {error})")

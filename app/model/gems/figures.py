@@ -119,16 +119,14 @@ def tilted(tilt_x_deg: float, tilt_y_deg: float = 0.0) -> np.ndarray:
 
 def face_places(stone: Stone, count: int) -> np.ndarray:
     """Places in the plane of the girdle, float64 (count², 3), rows from +y down, over the square round the stone."""
-    along = ((np.arange(count) + 0.5) / count * 2.0 - 1.0) * 1.02 * stone.radius
-    across = np.stack(np.meshgrid(along, -along), axis=-1).reshape(-1, 2)
-    return np.pad(across, ((0, 0), (0, 1)))
+    return 1.02 * stone.radius * seen_places(count, UP)
 
 
 def seen_places(count: int, up: np.ndarray) -> np.ndarray:
-    """Places over all of a stone as it is seen from `up`, float64 (count², 3)."""
+    """Places over all of a stone as it is seen from `up`, float64 (count², 3), its +y on top."""
     x = np.array([up[2], 0.0, -up[0]]) / math.hypot(up[0], up[2])
     along = (np.arange(count) + 0.5) / count * 2.0 - 1.0
-    a, b = np.meshgrid(along, along)
+    a, b = np.meshgrid(along, -along)
     return a.reshape(-1, 1) * x + b.reshape(-1, 1) * np.cross(up, x)
 
 
@@ -170,75 +168,74 @@ def look(
     return out
 
 
+def returned(sums: np.ndarray) -> np.ndarray:
+    """What comes from before the stone, (…) of (…, COLUMNS), in light from a whole hemisphere; …"""
+    from .paths import HEAD
+
+    return sums[..., HEAD] + beside_head(sums)
+
+
 def beside_head(sums: np.ndarray) -> np.ndarray:
-    """What comes from before the stone, beside the head, in light from a whole hemisphere."""
+    """… and of that what the head does not hide."""
     from .paths import HIGH, LOW
 
-    return sums[:, HIGH] + sums[:, LOW]
+    return sums[..., HIGH] + sums[..., LOW]
 
 
 # ---- figures ----------------------------------------------------------------------------------
 
+_ROWS = (
+    ("ISO", "{iso:.1%}", "light return of an even hemisphere, without what the outside reflects"),
+    ("COS", "{cos:.1%}", "light return of one that darkens by the cosine"),
+    ("ISO, head", "{iso_head:.1%}", "with the shadow of a head, {head_deg:g}°"),
+    ("COS, head", "{cos_head:.1%}", "with the shadow of a head, {head_deg:g}°"),
+    ("weighted return", "{weighted:.1%}", "into all directions, by the square of the cosine"),
+    ("glare", "{glare:.1%}", "reflected on the outside; with it ISO {iso_glare:.1%}, COS {cos_glare:.1%}"),
+    ("leak", "{leak:.1%}", "light from behind the stone"),
+    ("window", "{window:.1%}", "of the area shows mostly what is behind"),
+    ("extinction", "{dark:.1%}", "of the area is dark under the head, without being a window"),
+    ("fire", "{fire_deg:.2f}°", "mean angle between F and C of returned light"),
+    ("coloured", "{coloured:.1%}", "of returned light is spread wider than the eye's pupil"),
+    ("dispersed return", "{dispersed:.1%}", "of the light, that part by the square of the cosine"),
+    ("scintillation", "{scintillation:.1%}", "change of the picture by a tilt of 3°"),
+    ("not followed", "{rest:.4%}", "of the light"),
+)
+"""Name, value and meaning of each figure."""
+
 
 @dataclass(frozen=True)
 class GemFigures:
-    """What a stone does with light, face up; shares of what an eye sees of it, 0 to 1."""
+    """What a stone does with light, face up; shares of what an eye sees of it, 0 to 1, as `rows` explains."""
 
     iso: float
-    """Light return of an even hemisphere, without what is reflected on the outside; nothing hides light."""
     cos: float
-    """Likewise of a hemisphere that grows darker by the cosine from the viewer."""
     head_deg: float
-    """Half the angle of the head that hides light, for …"""
+    """Half the angle of the head that hides light."""
     iso_head: float
     cos_head: float
     weighted: float
-    """Light that an even hemisphere sends out of the stone into all directions above, by the square of the cosine."""
     glare: float
-    """Reflected on the outside."""
     iso_glare: float
-    """`iso` with the part of that which comes from above; …"""
     cos_glare: float
     leak: float
-    """Light from behind the stone: what is lost through it."""
     rest: float
     """Not followed to its end."""
     window: float
-    """Share of the stone's area that shows mostly what is behind it; …"""
     dark: float
-    """… and that is dark with the head's shadow, without being a window: extinction."""
+    """Extinction."""
     fire_deg: float
-    """Mean angle between F and C of returned light."""
     coloured: float
-    """Share of returned light that is spread wider than the eye's pupil."""
     dispersed: float
-    """The same by the square of the cosine, as a share of all light on the stone."""
     scintillation: float
-    """How much a tilt by 3° changes what is seen beside the head, mean of four tilts, of the mean."""
 
     def rows(self) -> tuple[tuple[str, str, str], ...]:
         """Name, value and meaning of each."""
+        known = vars(self)
+        return tuple((name, _shown(value, known), _shown(meaning, known)) for name, value, meaning in _ROWS)
 
-        def share(value: float) -> str:
-            return f"{100.0 * value:.1f} %"
 
-        head = f"with the shadow of a head, {self.head_deg:g}°"
-        return (
-            ("ISO", share(self.iso), "light return of an even hemisphere"),
-            ("COS", share(self.cos), "light return of one that darkens by the cosine"),
-            ("ISO, head", share(self.iso_head), head),
-            ("COS, head", share(self.cos_head), head),
-            ("weighted return", share(self.weighted), "into all directions, by the square of the cosine"),
-            ("glare", share(self.glare), f"reflected on the outside; with it ISO {share(self.iso_glare)}"),
-            ("leak", share(self.leak), "light from behind the stone"),
-            ("window", share(self.window), "of the area shows mostly what is behind"),
-            ("extinction", share(self.dark), "of the area is dark under the head"),
-            ("fire", f"{self.fire_deg:.2f}°", "mean angle between F and C of returned light"),
-            ("coloured", share(self.coloured), "of returned light is spread wider than the eye's pupil"),
-            ("dispersed return", share(self.dispersed), "of the light, that part by the square of the cosine"),
-            ("scintillation", share(self.scintillation), "change of the picture by a tilt of 3°"),
-            ("not followed", f"{100.0 * self.rest:.2g} %", "of the light"),
-        )
+def _shown(text: str, values: dict[str, float]) -> str:
+    return text.format(**values).replace("%", " %")
 
 
 def seen_mean(sums: np.ndarray) -> np.ndarray:
@@ -264,9 +261,9 @@ def figures(
     face = look(stone, face_places(stone, count), UP, UP, head_deg, cancelled=stopped)
     if stopped():
         return None
-    sums = seen_mean(face).tolist()
+    sums = seen_mean(face)
     seen = face[:, :6].sum(axis=1) > 0.0
-    above = sums[g.HEAD] + sums[g.HIGH] + sums[g.LOW]
+    above = float(returned(sums))
     windows = (face[:, g.LEAK] > _WINDOW)[seen]
     dark = (beside_head(face) < _DARK)[seen] & ~windows
     told(0.3, "scintillation")
@@ -279,6 +276,7 @@ def figures(
     if stopped():
         return None
     told(1.0, "")
+    sums = sums.tolist()
     return GemFigures(
         iso=above,
         cos=sums[g.COSINE],
@@ -303,8 +301,6 @@ def figures(
 def _weighted(stone: Stone, count: int, stopped: Cancelled) -> float:
     """∫∫ L cos²θ dA dω of all directions above by the light on the crown, ∫∫ dA dω, L what the stone sends there out of
     an even hemisphere of 1 above its table: after Hemphill et al. 1998. By `count` places on the crown."""
-    from . import paths as g
-
     edges = stone.corners[:, 1:] - stone.corners[:, :1]
     areas = np.where(stone.normals[:, 2] > 1e-6, 0.5 * np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1), 0.0)
     if areas.sum() == 0.0:
@@ -324,7 +320,7 @@ def _weighted(stone: Stone, count: int, stopped: Cancelled) -> float:
         facing = normals @ to
         seen = facing > 0.0
         sums = look(stone, places[seen] - 4.0 * to, to, UP, cancelled=stopped)
-        total += float(facing[seen] @ (sums[:, g.HEAD] + sums[:, g.HIGH] + sums[:, g.LOW])) * c * c
+        total += float(facing[seen] @ returned(sums)) * c * c
         area += float(facing[seen].sum())
         if stopped():
             return math.nan

@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.errors import UserError, suggestion
+from ...base.errors import UserError
 from ..geometry.mesh import Mesh, convex_planes_of
-from ..naming import listed
+from ..naming import place_of
 from ..scene import Scene, SceneObject
 from .facet_design import MOST_FACETS, FacetDesign, Tier
 
@@ -33,12 +33,7 @@ def design_in(scene: Scene, name: str) -> tuple[FacetDesign, str]:
     Raises `UserError` where there is none of that name, it is no convex solid of flat facets, or these stand on no
     gear's teeth.
     """
-    item = next((each for each in scene.objects if each.name == name), None)
-    if item is None:
-        names = [each.name for each in scene.objects]
-        raise UserError(
-            f"scene '{scene.name}' has no object '{name}'{suggestion(name, names) or ';'} it has {listed(names)}"
-        )
+    item = scene.objects[place_of(name, [each.name for each in scene.objects], f"scene '{scene.name}' has no object")]
     n_d = item.material.dispersion.n_d if item.material.transmits and item.material.is_solid else None
     found: list[FacetDesign] = []
     refusals: list[str] = []
@@ -68,11 +63,10 @@ def design_in(scene: Scene, name: str) -> tuple[FacetDesign, str]:
 def _ways_to_look(item: SceneObject) -> list[Mesh]:
     """Its mesh in its own coordinates, stretched as it is in the scene but not turned, and as it stands there."""
     linear = item.object_to_world[:3, :3]
-    _, sizes, turn = np.linalg.svd(linear)
-    own = turn.T @ np.diag(sizes) @ turn
+    own = item.stretch
     if np.linalg.det(linear) < 0.0:
         own = np.diag([-1.0, 1.0, 1.0]) @ own
-    ways = [own] if np.allclose(own, linear, atol=1e-12 * sizes[0]) else [own, linear]
+    ways = [own] if np.allclose(own, linear, atol=1e-12 * np.linalg.norm(own)) else [own, linear]
     return [item.mesh.transformed(np.block([[way, np.zeros((3, 1))], [np.zeros(3), np.ones(1)]])) for way in ways]
 
 

@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...base.errors import UserError, suggestion
-from ..geometry.mesh import Mesh, note_recipe
-from ..geometry.primitives import plane
+from ...base.errors import UserError
+from ..geometry.mesh import Mesh
 from ..lights.light import DEFAULT_ILLUMINANCE
 from ..lights.outlined import CollimatedLight
-from ..naming import listed
+from ..naming import place_of
 from ..optics.glass import Dispersion
 from ..optics.spectrum import illuminant
 from ..scene import Camera, Dielectric, Diffuse, Scene, SceneObject
+from ..scene_objects import make_shape
 from .figures import Stone, stone_of
 
 TABLE = "table"
@@ -31,13 +31,9 @@ def stone_in(scene: Scene, name: str | None = None, glass: Dispersion | None = N
 
     `up`: where its table faces, an axis of its own coordinates. Raises `UserError`.
     """
-    return stone_from(chosen_stone(scene, name, glass), glass, up)
-
-
-def stone_from(item: SceneObject, glass: Dispersion | None = None, up: str = "z") -> Stone:
-    """Likewise, an object that `chosen_stone` gave."""
     if up not in AXES:
         raise UserError(f"'{up}' is no axis for the table to face; give one of {', '.join(AXES)}")
+    item = chosen_stone(scene, name, glass)
     notes: list[str] = []
     material = item.material
     if glass is None:
@@ -53,18 +49,15 @@ def stone_from(item: SceneObject, glass: Dispersion | None = None, up: str = "z"
 def chosen_stone(scene: Scene, name: str | None = None, glass: Dispersion | None = None) -> SceneObject:
     """The object that `stone_in` takes. Raises `UserError`."""
     solids = [item for item in scene.objects if item.material.is_solid and item.material.transmits]
-    names = [item.name for item in scene.objects]
-    if name is None and not solids:
-        raise UserError(
-            f"scene '{scene.name}' has no solid of glass; name one of its objects with a glass to be cut of"
-        )
-    if name is None:
+    if name is not None:
+        item = scene.objects[
+            place_of(name, [each.name for each in scene.objects], f"scene '{scene.name}' has no object")
+        ]
+    elif solids:
         item = solids[0]
-    elif name in names:
-        item = scene.objects[names.index(name)]
     else:
         raise UserError(
-            f"scene '{scene.name}' has no object '{name}'{suggestion(name, names) or ';'} it has {listed(names)}"
+            f"scene '{scene.name}' has no solid of glass; name one of its objects with a glass to be cut of"
         )
     if glass is not None:
         return item
@@ -80,12 +73,10 @@ def chosen_stone(scene: Scene, name: str | None = None, glass: Dispersion | None
 
 def _face_up(item: SceneObject, up: str) -> Mesh:
     """Its mesh as stretched in the scene but not turned there, `up` to +z."""
-    _, sizes, right = np.linalg.svd(item.object_to_world[:3, :3])
     matrix, axis = np.eye(4), "xyz".index(up[-1])
-    stretch = right.T @ np.diag(sizes) @ right
     # The axis goes to z, the next ones to x and y; downward ones turn about x.
     turned = np.roll(np.eye(3), -(axis + 1), axis=0)
-    matrix[:3, :3] = (np.diag([1.0, -1.0, -1.0]) if up[0] == "-" else np.eye(3)) @ turned @ stretch
+    matrix[:3, :3] = (np.diag([1.0, -1.0, -1.0]) if up[0] == "-" else np.eye(3)) @ turned @ item.stretch
     return replace(item.mesh.transformed(matrix), name=item.name)
 
 
@@ -96,9 +87,7 @@ def under_lamp(stone: Stone) -> Scene:
     turn = np.array([(1.0, 0.0, 0.0), (0.0, -math.cos(lean), math.sin(lean)), (0.0, -math.sin(lean), -math.cos(lean))])
     matrix[:3, :3] = scale * turn
     matrix[2, 3] = _HEIGHT
-    white = plane(_WIDTH, _WIDTH, name=TABLE)
-    note_recipe(white, {"shape": "plane", "width": _WIDTH, "height": _WIDTH})
-    mesh = stone.mesh
+    white = make_shape("plane", width=_WIDTH, height=_WIDTH)
     return Scene(
         f"{stone.name} under a lamp",
         Camera((0.0, -6.0, 5.0), (0.0, 0.0, 0.5)),
@@ -112,7 +101,7 @@ def under_lamp(stone: Stone) -> Scene:
             ),
         ),
         (
-            SceneObject("stone", mesh, Dielectric(stone.glass), matrix),
+            SceneObject("stone", stone.mesh, Dielectric(stone.glass), matrix),
             SceneObject(TABLE, white, Diffuse((0.8, 0.8, 0.8))),
         ),
     )

@@ -21,6 +21,7 @@ from .figures import (
     face_places,
     figures,
     look,
+    returned,
     seen_mean,
     seen_places,
     tilted,
@@ -136,7 +137,7 @@ def gem_report(
     for i, nm in enumerate(lines):
         told(0.2 + 0.03 * i, "wavelengths")
         sums = seen_mean(look(stone, face_places(stone, 128), UP, UP, head_deg, nm))
-        by_line.append(_above(sums))
+        by_line.append(float(returned(sums)))
     curves = np.full((3, 2, len(TILTS_DEG)), np.nan)
     ways = [(axis, k) for axis in (0, 1) for k in range(len(TILTS_DEG))]
     for i, (axis, k) in enumerate(ways):
@@ -151,19 +152,13 @@ def gem_report(
     return GemReport(stone, found, TILTS_DEG, curves[0], curves[1], curves[2], lines, tuple(by_line), pictures, thrown)
 
 
-def _above(sums: np.ndarray) -> float:
-    from .paths import HEAD, HIGH, LOW
-
-    return float(sums[HEAD] + sums[HIGH] + sums[LOW])
-
-
 def _tilt(stone: Stone, axis: int, angle_deg: float, head_deg: float) -> tuple[float, float, float]:
     """Light return by ISO and COS, and the first with the head's shadow, of a stone tilted about x or y."""
-    from .paths import COSINE, HEAD
+    from .paths import COSINE
 
     way = tilted(angle_deg, 0.0) if axis == 0 else tilted(0.0, angle_deg)
     sums = seen_mean(look(stone, seen_places(_TILT_COUNT, way), way, way, head_deg))
-    return _above(sums), float(sums[COSINE]), _above(sums) - float(sums[HEAD])
+    return float(returned(sums)), float(sums[COSINE]), float(beside_head(sums))
 
 
 # ---- pictures ---------------------------------------------------------------------------------
@@ -190,7 +185,7 @@ def shown(sums: np.ndarray, name: str) -> np.ndarray:
     elif name == "brightness":
         rgb = beside_head(sums)[:, None] * _WHITE
     else:
-        above = (head + high + low)[:, 0]
+        above = returned(sums)
         angle = np.degrees(np.divide(sums[:, SPREAD], above, out=np.zeros(len(sums)), where=above > 0.0))
         rgb = srgb_eotf(sample(FALSE_COLOUR, angle / _FULL_SPREAD_DEG))
     ground = _BLACK if name in ("brightness", "fire") else _WHITE
