@@ -28,11 +28,11 @@ def test_documents_point_to_what_is_in_the_site(tmp_path: Path) -> None:
 
 
 def test_what_has_no_page_is_listed_without_a_link(tmp_path: Path) -> None:
-    cards = [Card("A <b>", "", "scenes/a.jpg", "scenes/a.html"), Card("C", "'x' is curved", None, None)]
+    cards = [Card("A <b>", "", "scenes/a.jpg", "scenes/a.html"), Card("C", "no: 'x' is curved", None, None)]
     write_index(tmp_path, {"Scenes": cards}, None)
     text = (tmp_path / "index.html").read_text()
     assert '<a href="scenes/a.html">' in text and "A &lt;b&gt;" in text
-    assert "&#x27;x&#x27; is curved" in text and text.count("<a ") == 1
+    assert "No: &#x27;x&#x27; is curved" in text and text.count("<a ") == 1
 
 
 def test_names_are_those_of_scenes_and_lessons() -> None:

@@ -22,7 +22,8 @@ _STYLE = """
 .cards { display: grid; grid-template-columns: repeat(auto-fill, minmax(260px, 1fr)); gap: 18px; padding: 0; }
 .cards li { list-style: none; } .cards img { width: 100%; border-radius: 6px; display: block; }
 .cards a { color: inherit; text-decoration: none; } .cards b { display: block; margin-top: 6px; }
-a { color: var(--accent); } article { max-width: 90ch; overflow-x: auto; } article img { max-width: 100%; }
+h2 { font-size: 1.2rem; } a { color: var(--accent); }
+article { max-width: 90ch; overflow-x: auto; } article img { max-width: 100%; }
 table { border-collapse: collapse; } td, th { border: 1px solid var(--line); padding: 4px 8px; text-align: left; }
 pre { overflow-x: auto; background: var(--field); padding: 8px 12px; } td img { max-width: 260px; }
 """
@@ -50,7 +51,7 @@ def write_index(folder: Path, parts: dict[str, list[Card]], documents: str | Non
 
 
 def _card(card: Card) -> str:
-    title, words = html.escape(card.title), html.escape(card.words)
+    title, words = html.escape(card.title), html.escape(card.words[:1].upper() + card.words[1:])
     picture = f'<img src="{card.picture}" alt="" loading="lazy">' if card.picture else ""
     inside = f"{picture}<b>{title}</b>"
     inside = f'<a href="{card.page}">{inside}</a>' if card.page else inside
