@@ -1,5 +1,4 @@
-"""Mistakes in functions of shaders/lib and in the queue that have no test of their own: whole pictures and paths notice
-them."""
+"""Mistakes in functions of shaders/lib and in the queue."""
 
 from __future__ import annotations
 
@@ -140,5 +139,83 @@ OF_LIBRARY = {
         "place.texel_area * at.z * at.z * at.z",
         "place.texel_area * at.z * at.z",
         "gpu/test_picture_windows.py::test_a_pixel_shows_its_own_texels_only[1]",
+    ),
+    "the extraordinary wave on the other side of the ordinary one": Mutant(
+        "lib/crystal.glsl",
+        "ellipticity * length2[0].x",
+        "-ellipticity * length2[0].x",
+        "gpu/test_glsl_reference_crystal.py::test_shares_are_those_of_the_continuous_fields[in]",
+    ),
+    "slopes of throughput swapped": Mutant(
+        "lib/swept.glsl",
+        "min(aside, 0.0) * throughput.z + max(aside, 0.0) * throughput.w",
+        "min(aside, 0.0) * throughput.w + max(aside, 0.0) * throughput.z",
+        "gpu/test_splat.py::test_throughput_over_the_band",
+    ),
+    "columns end before the surface's tilt": Mutant(
+        "lib/optics.glsl",
+        "(dot(moved, normal_g) / dot(direction, normal_g))",
+        "0.0",
+        "gpu/test_known_answers_gpu.py::test_t4_ball_lens[light]",
+    ),
+    "refraction without the index's own derivative": Mutant(
+        "lib/optics.glsl",
+        "(deta_it / omega)",
+        "(0.0 / omega)",
+        "gpu/test_known_answers_gpu.py::test_t2_prism_at_minimum_deviation[N-BK7-light]",
+    ),
+    "a film of air between solids that touch": Mutant(
+        "lib/intersect.glsl",
+        "(facing > 0.0 ? distance + NEAR_DISTANCE : distance)",
+        "distance",
+        "gpu/test_known_answers_gpu.py::test_t12_amici_prism_of_three_touching_solids[light]",
+    ),
+    "a film's shares at a band's ends and anchor alone": Mutant(
+        "lib/film.glsl",
+        "from = to = x.xyzz;",
+        "from = to = x.xyzz;\n    } else {\n        from = to = x.xyzz;",
+        "gpu/test_thin_films.py::test_a_patch_of_sun_behind_a_film[etalon-srd]",
+    ),
+    "orders of a grating to the other side": Mutant(
+        "lib/grating.glsl",
+        "return met.side * normalize",
+        "return -met.side * normalize",
+        "gpu/test_grating_gpu.py::test_functions_against_float64",
+    ),
+    "waves as long in water as in air": Mutant(
+        "lib/grating.glsl",
+        "medium_index(met.object, x) / medium_index(met.medium, x)",
+        "medium_index(met.object, x)",
+        "gpu/test_grating_gpu.py::test_water_shortens_waves",
+    ),
+    "polarisation: planes do not turn": Mutant(
+        "lib/polarisation.glsl",
+        "state.q = cosine * q + sine * state.u;",
+        "state.q = q;",
+        "gpu/test_polarised_paths_gpu.py::test_throughput_of_whole_paths[stone]",
+    ),
+    "polarisation: no retardance": Mutant(
+        "lib/polarisation.glsl",
+        "mix(2.0 * x * y * per, vec3(0.0), passes)",
+        "vec3(0.0)",
+        "gpu/test_polarised_paths_gpu.py::test_throughput_of_whole_paths[stone]",
+    ),
+    "polarisation: circular light keeps its sense": Mutant(
+        "lib/polarisation.glsl",
+        "vec3(-1.0), vec3(0.0));",
+        "vec3(1.0), vec3(0.0));",
+        "gpu/test_polarised_paths_gpu.py::test_throughput_of_whole_paths[panes with a mirror between]",
+    ),
+    "bounces: cosine": Mutant(
+        "lib/bounce.glsl",
+        "3.14159265359 * both /",
+        "3.14159265359 * cosine_there /",
+        "gpu/test_bounces.py::test_a_lit_floor_lights_the_wall_by_its_form_factor",
+    ),
+    "bounces: density": Mutant(
+        "lib/bounce.glsl",
+        "density * distance2",
+        "density * sqrt(distance2)",
+        "gpu/test_bounces.py::test_a_lit_floor_lights_the_wall_by_its_form_factor",
     ),
 }

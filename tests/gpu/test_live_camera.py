@@ -18,7 +18,6 @@ from spectrasplat.gpu.device_traits import Budget
 from spectrasplat.model.environment import gradient, world_to_local
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import SpotLight
-from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.model.texture import Environment
@@ -30,6 +29,8 @@ from spectrasplat.render.viewer.glass_steps import STEPS, GlassSteps
 from spectrasplat.render.viewer.invalidation import appearance_differs, dirty_level
 from spectrasplat.render.viewer.live_camera import MOVING_TAPS, _side
 from spectrasplat.render.viewer.spectrum_guess import guess_weights
+
+from tests.gpu.test_live_light import edited
 
 SIZE = (120, 68)
 WHITE = 5.0
@@ -66,16 +67,6 @@ def edged(scene: Scene, turn_deg: float = 0.0) -> Scene:
     rgb = np.zeros((90, 360, 3), np.float32)
     rgb[:, np.arange(360) % 8 < 4] = WHITE
     return replace(scene, environment=Environment(rgb, world_to_local((0.0, 0.0, 1.0), turn_deg), lights=False))
-
-
-def with_dispersion(scene: Scene, gain: float) -> Scene:
-    objects = [
-        replace(o, material=replace(o.material, dispersion=with_gain(o.material.dispersion, gain)))
-        if isinstance(o.material, Dielectric)
-        else o
-        for o in scene.objects
-    ]
-    return replace(scene, objects=tuple(objects))
 
 
 @pytest.fixture
@@ -163,7 +154,7 @@ def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: 
         if not shown or shown[-1][0] != engine.picture_version:
             shown.append((engine.picture_version, int(stats.camera_samples), stats.camera_bands))
 
-    engine.set(inputs(with_dispersion(edged(stage), 3.0)))
+    engine.set(inputs(edited(edged(stage), 3.0)))
     until(lambda: engine.is_idle, engine, look)
     told = [(samples, bands) for version, samples, bands in shown if version]
     assert told[0][1] == 1 and told[-1][1] > 1, told
@@ -178,7 +169,7 @@ def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: 
 @pytest.mark.slow
 def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine, stage: Scene) -> None:
     engine.target_photons = 1 << 16
-    wanted = inputs(with_dispersion(edged(stage), 3.0))
+    wanted = inputs(edited(edged(stage), 3.0))
     engine.set(wanted)
     until(
         lambda: (
@@ -203,18 +194,18 @@ def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(
     scene = edged(stage)
     before = settle(engine, inputs(scene))
     rays, mask = engine.stats.rays_traced, in_glass(engine, before.shape)
-    edited = with_dispersion(scene, 4.0)
+    changed = edited(scene, 4.0)
     assert (
-        appearance_differs(inputs(scene), inputs(edited))
-        and dirty_level(inputs(scene), inputs(scene), inputs(edited)) == DirtyLevel.SPLAT
+        appearance_differs(inputs(scene), inputs(changed))
+        and dirty_level(inputs(scene), inputs(scene), inputs(changed)) == DirtyLevel.SPLAT
     )
-    after = settle(engine, inputs(edited))
+    after = settle(engine, inputs(changed))
     assert engine.stats.rays_traced == rays and engine.stats.first_order
     change = np.abs(after - before).max(axis=-1)
     assert (change[mask] > 0.1 * WHITE).mean() > 0.05
     fresh = LiveEngine(gl, engine.budget)
     fresh.target_photons = engine.target_photons
-    expected = settle(fresh, inputs(edited))
+    expected = settle(fresh, inputs(changed))
     fresh.release()
     assert np.sqrt(((after - expected)[mask] ** 2).mean()) < 0.15 * np.sqrt(((before - expected)[mask] ** 2).mean())
 
