@@ -130,6 +130,11 @@ class Solver:
                 last, best = best, int(np.argmin(errors))
             best = last if len(seen) == _STEPS else best
         self._check_ends(columns)
+        if not errors.min() < _HARDLY:
+            raise UserError(
+                f"no glass was found that casts such light there; the last that was tried is {names[best]}: give the "
+                "scene's object a glass whose light falls nearer to it"
+            )
         order = np.argsort(errors, kind="stable")[: min(count, int(np.isfinite(errors).sum()))]
         ranked = tuple(
             Ranked(names[i], entries[i].dispersion.n_d, entries[i].dispersion.V_d, float(errors[i])) for i in order
