@@ -42,7 +42,7 @@ from .sample_spread import (
     spread_samples,
     spread_survey,
 )
-from .spectrum_choice import PilotRender, Spectrum, choosing_spectrum, grid_of
+from .spectrum_choice import PilotRender, Spectrum, bands_of_plates, choosing_spectrum, grid_of
 
 SPLIT_THRESHOLD = 0.0008
 """Share of a sample's power above which both parts of a split path are followed: small enough for the third reflection
@@ -95,7 +95,8 @@ class CameraPass:
         """Samples differ in the stretch of the spectrum they see."""
         self.fixed_bands = {"regular-7": 7, "regular-16": 16, "srd-lambda": 1}.get(features.method)
         """What the method prescribes."""
-        self.spectrum = Spectrum(self.fixed_bands or 1)
+        self.least_bands = bands_of_plates(scene.scene.objects)
+        self.spectrum = Spectrum(self.fixed_bands or self.least_bands)
         """How samples see the spectrum; one of `single` wavelengths needs `may_be_single`."""
         self.may_be_single = False
         """Where bands serve a scene badly, wavelengths may be taken one by one. That takes a program of its own, which
@@ -241,7 +242,7 @@ class CameraPass:
         if not self.chooses:
             return
         maps = maps or self._inputs.no_maps
-        looks = choosing_spectrum(samples, self.may_be_single)
+        looks = choosing_spectrum(samples, self.may_be_single, self.least_bands)
         picture: np.ndarray | None = None
         while True:
             try:

@@ -5,16 +5,22 @@ the samples, and what one band's middle decides for all of it, which does not.""
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Iterable
 from dataclasses import dataclass
+from math import ceil, log2, pi
 
 import numpy as np
+
+from ..model.optics.colorimetry import VISIBLE_NM
+from ..model.scene import SceneObject
 
 MIN_SAMPLES = 8
 """With fewer, a pilot would cost more than it brings: one band."""
 MAX_BANDS = 32
 SAMPLES_A_BAND = 8
 """Samples that every band must keep, to smooth an outline."""
+PHASE_A_BAND = 0.45
+"""Change of a wave plate's phase over a band, rad: what interferes is straight between a band's three places."""
 _COLUMNS = 50
 """Columns of a pilot's picture."""
 SINGLE_SPEED = 4
@@ -60,9 +66,17 @@ class PilotRender:
 Lookups = Generator[PilotRender, np.ndarray, Spectrum]
 
 
-def choosing_spectrum(samples: int, may_be_single: bool) -> Lookups:
-    """Yields pictures it wants, is sent them (H, W, C), and returns what is best for `samples` samples a pixel."""
-    chosen = Spectrum()
+def bands_of_plates(objects: Iterable[SceneObject]) -> int:
+    """How many bands wave plates ask for at least, all in a row: 1 where there are none."""
+    retardance_nm = sum(abs(thing.material.retardance_nm) for thing in objects)
+    phase_rad = 2.0 * pi * retardance_nm * (1.0 / VISIBLE_NM[0] - 1.0 / VISIBLE_NM[-1])
+    return min(1 << max(ceil(log2(max(phase_rad / PHASE_A_BAND, 1.0))), 0), MAX_BANDS)
+
+
+def choosing_spectrum(samples: int, may_be_single: bool, least: int = 1) -> Lookups:
+    """Yields pictures it wants, is sent them (H, W, C), and returns what is best for `samples` samples a pixel, of
+    `least` bands or more."""
+    chosen = Spectrum(least)
     if samples < MIN_SAMPLES:
         return chosen
     coarse = (yield PilotRender(chosen, 1)), (yield PilotRender(chosen, 2))

@@ -108,7 +108,7 @@ class CameraSampling:
             return spectrum.samples(self.budget)
         bands = spectrum.bands
         if camera_pass.chooses and not self.whole_spectrum:
-            bands = most_bands(self.bands_for or self.budget)
+            bands = max(most_bands(self.bands_for or self.budget), camera_pass.least_bands)
         return whole_cycles(self.budget, bands)
 
 

@@ -70,6 +70,7 @@ class Material:
     """A crystal's optic axis or a polariser's, a unit vector in the object's own coordinates."""
     priority = 0
     thin = False
+    retardance_nm = 0.0
     transmittance_rgb = (1.0, 1.0, 1.0)
     """Linear Rec.709 transmittance of coloured glass, for light that enters and leaves it."""
 
