@@ -18,13 +18,20 @@ void send_lobe(inout Path path, Hit hit, Event event, CrystalEvent met, uint lob
 
 // One crystal surface: `path` goes on, other lobes are put on the stack.
 void cross_crystal(inout Path path, Hit hit, Event event, uint pixel_key) {
-    Path whole = path;
-    CrystalEvent outside = crystal_event(path, event), met = outside;
+    CrystalEvent met = crystal_event(path, event);
+    vec4 lobes = vec4(1.0);
     if (HAS_DISPERSION && path.restricted == 0u) {
+        // What is reflected off the outside knows no wavelength but in its strength: it stays whole.
+        if (!met.from_crystal && stack_size < STACK) {
+            Path mirrored = path;
+            send_lobe(mirrored, hit, event, met, 0u, 1.0);
+            push(mirrored);
+            lobes.x = 0.0;
+        }
         restrict_to_band(path, pixel_key);
         met = crystal_event(path, event);
     }
-    vec4 likely = met.shares * OVER_BAND;
+    vec4 likely = lobes * (met.shares * OVER_BAND);
     uint kept = strongest_lobe(likely);
     float all = dot(likely, vec4(1.0)), least = min(all - likely[kept], likely[kept]);
     if (all <= 0.0) {
@@ -39,15 +46,10 @@ void cross_crystal(inout Path path, Hit hit, Event event, uint pixel_key) {
     for (uint lobe = 0u; splits && lobe < uint(LOBES); ++lobe) {
         if (lobe == kept || likely[lobe] <= 0.0) continue;
         Path part = path;
-        // What is reflected off the outside knows no wavelength but in its strength: it stays whole.
-        bool stays = lobe == 0u && !met.from_crystal;
-        if (stays) part = whole;
-        send_lobe(part, hit, event, stays ? outside : met, lobe, 1.0);
+        send_lobe(part, hit, event, met, lobe, 1.0);
         push(part);
     }
-    bool stays = kept == 0u && !met.from_crystal;
-    if (stays) path = whole;
-    send_lobe(path, hit, event, stays ? outside : met, kept, splits ? 1.0 : likely[kept] / all);
+    send_lobe(path, hit, event, met, kept, splits ? 1.0 : likely[kept] / all);
 }
 
 void cross_polariser(inout Path path, Hit hit, uint texel, uint pixel_key) {

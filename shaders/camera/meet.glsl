@@ -203,8 +203,13 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
             return;
         }
     }
-    Event event = interact(path, hit, facet, object_at(hit.object),
+    Event event = meet(path, hit, facet, object_at(hit.object),
         MicrofacetDraw(p.sample_index, path.depth, hash_combine(pixel_key, 80u)));
+    if (HAS_CRYSTAL && parts_waves(event, kind)) {
+        cross_crystal(path, hit, event, pixel_key);
+        return;
+    }
+    weigh(path, kind, event);
     if (HAS_MIRROR && kind == KIND_MIRROR) {
         bool geometric;
         if (HAS_FILM && FILM_MET(event)) leave_film_share(path, event, true);
@@ -225,9 +230,7 @@ void meet_surface(inout Path path, Hit hit, uint kind, uint pixel_key) {
         }
         path.walk.branch_weight *= max(colour.r, max(colour.g, colour.b));
     }
-    bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
-    if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) cross_glass(path, whole, hit, kind, event, pixel_key);
-    if (HAS_CRYSTAL && parts_waves) cross_crystal(path, hit, event, pixel_key);
+    if (HAS_DIELECTRIC && IS_GLASS(kind)) cross_glass(path, whole, hit, kind, event, pixel_key);
     if (HAS_POLARISER && kind == KIND_POLARISER) cross_polariser(path, hit, object_at(hit.object).receiver, pixel_key);
     if (HAS_GRATING && kind == KIND_GRATING) meet_grating(path, whole, hit, event, pixel_key);
 }

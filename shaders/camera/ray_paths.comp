@@ -41,8 +41,10 @@ void main() {
         points[at + number + 1u] = vec4(path.position, 0.0);
         if (!is_specular(kind)) break;
         bool entering = dot(path.direction, hit.normal_g) < 0.0, reflects = true, geometric;
-        Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, 0u, 0u));
-        if (HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary)) {
+        Event event = meet(path, hit, facet, thing, MicrofacetDraw(0u, 0u, 0u));
+        bool in_crystal = parts_waves(event, kind);
+        if (!in_crystal) weigh(path, kind, event);
+        if (HAS_CRYSTAL && in_crystal) {
             // The stronger of both waves that go on, if one does.
             CrystalEvent crystal = crystal_event(path, event);
             uint sent = strongest_lobe(crystal.shares[1] * vec4(1e-9, 1e-9, 1.0, 1.0));

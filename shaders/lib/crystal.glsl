@@ -60,95 +60,97 @@ vec3 turned_column(Uniaxial m, vec2 slopes, vec3 wave, vec3 dwave, vec3 turned, 
     return (denergy - dot(ray, denergy) * ray) * per_length;
 }
 
-// Electric and magnetic fields of the ordinary and the extraordinary wave in the interface: along the tangential part
-// of the wave vector and along s, the magnetic ones turned there by a right angle. They are complex: x + iy is the
-// matrix mat2(x, y, -y, x), so that products are products and conjugates are transposed.
-struct Waves {
-    mat4 electric, magnetic;  // two columns a wave
-    vec2 pass;  // 1: a wave carries energy away, of unit power then; 0: it is evanescent
+// The fields of a wave in the interface, complex: electric along the tangential part of the wave vector and along s,
+// then magnetic along s and against that part, so that what carries energy forwards are the products of both halves. Of
+// unit power where the wave carries energy away; else it is evanescent.
+struct Wave {
+    mat2x4 field;  // real, imaginary part
+    bool passes;
 };
 
-// Those that go forwards (`side` 1) or backwards (-1) with the tangential part of `wave`, which is in the interface's
-// axes as the optic axis is: the tangential part, s and forwards; its length is `n`.
-Waves waves(Uniaxial m, vec3 wave, float n, float side) {
-    Waves found;
-    bool along_axis = false;
-    float tangential = wave.x, ellipticity = 1.0 / (m.n.x * m.n.x) - 1.0 / (m.n.y * m.n.y);
-    // Wave vector times axis: across both.
-    mat2 forward = mat2(0.0), w_t = mat2(0.0), w_s = mat2(-tangential * m.axis.z), w_n = mat2(tangential * m.axis.y),
-         length2;
-    for (int e = 0; e < 2; ++e) {
-        vec2 part = side * forward_part(of_kind(m, e == 1), false, wave, n, vec3(0.0, 0.0, side));
-        mat2 step = mat2(part, -part.y, part.x) - forward;
-        // How far the extraordinary wave is from the ordinary one: exact where they are almost the same.
-        if (e == 1 && part.y == 0.0 && forward[0].y == 0.0)
-            step = mat2(
-                ellipticity * length2[0].x / energy_of_wave(m, vec3(2.0 * tangential, 0.0, part.x + forward[0].x)).z);
-        forward += step;
-        w_t -= m.axis.y * step;
-        w_s += m.axis.x * step;
-        length2 = w_t * w_t + w_s * w_s + w_n * w_n;
-        along_axis = along_axis || (part.y == 0.0 && length2[0].x < ALONG_AXIS * m.n.x * m.n.x);
-        if (along_axis) {
-            w_t = w_n = length2 = mat2(0.0);
-            w_s = mat2(1.0);
-        }
-        mat2 e_t = w_t, e_s = w_s, h_t = -forward * w_s, h_s = forward * w_t - tangential * w_n;
-        if (e == 1) {
-            mat2 square = forward * forward + mat2(tangential * tangential);
-            e_t = h_t + ellipticity * tangential * (mat2(tangential * m.axis.x) + m.axis.z * forward) * length2;
-            e_s = h_s;
-            h_t = -square * w_t;
-            h_s = -square * w_s;
-        }
-        vec4 electric = vec4(e_t[0], e_s[0]), magnetic = vec4(h_s[0], -h_t[0]);
-        found.pass[e] = float(part.y == 0.0);
-        float size =
-            part.y == 0.0 ? 2.0 * abs(dot(electric, magnetic)) : dot(electric, electric) + dot(magnetic, magnetic);
-        mat4 unit =
-            inversesqrt(max(size, 1e-30)) * mat4(electric, vec4(e_t[1], e_s[1]), magnetic, vec4(h_s[1], -h_t[1]));
-        found.electric[2 * e] = unit[0];
-        found.electric[2 * e + 1] = unit[1];
-        found.magnetic[2 * e] = unit[2];
-        found.magnetic[2 * e + 1] = unit[3];
+vec2 times(vec2 a, vec2 b) { return vec2(a.x * b.x - a.y * b.y, a.x * b.y + a.y * b.x); }
+
+vec2 conjugate(vec2 a) { return vec2(a.x, -a.y); }
+
+Wave unit_wave(mat4x2 fields, bool passes) {
+    mat2x4 field = transpose(fields);
+    float size = passes ? 2.0 * abs(dot(field[0].xy, field[0].zw)) : dot(field[0], field[0]) + dot(field[1], field[1]);
+    return Wave(inversesqrt(max(size, 1e-30)) * field, passes);
+}
+
+// The ordinary and the extraordinary wave that go forwards (`side` 1) or backwards (-1) with the tangential part of
+// `wave`, which is in the interface's axes as the optic axis c is: the tangential part q, s and forwards; its length is
+// `n`. With k = (q, 0, z) and z^2 = n_o^2 - q^2 of the ordinary wave, whose electric field is k x c as the other's
+// magnetic one is, all fields are linear in z.
+void waves(Uniaxial m, vec3 wave, float n, float side, out Wave ordinary, out Wave extraordinary) {
+    vec3 c = m.axis, way = vec3(0.0, 0.0, side);
+    float q = wave.x, n2 = m.n.x * m.n.x, ellipticity = 1.0 / n2 - 1.0 / (m.n.y * m.n.y);
+    vec2 o = side * forward_part(of_kind(m, false), false, wave, n, way),
+         e = side * forward_part(m, false, wave, n, way), across = c.x * o - vec2(q * c.z, 0.0);
+    // How far the extraordinary wave is from the ordinary one: exact where they are almost the same.
+    vec2 length2 = times(across, across) + vec2(n2 * c.y * c.y, 0.0),
+         both =
+             vec2(energy_of_wave(m, vec3(2.0 * q, 0.0, o.x + e.x)).z, energy_of_wave(m, vec3(0.0, 0.0, o.y + e.y)).z),
+         step = ellipticity / max(dot(both, both), 1e-20) * times(length2, conjugate(both));
+    if (o.y == 0.0 && length2.x < ALONG_AXIS * n2) {
+        across = vec2(1.0, 0.0);
+        c.y = 0.0;
+        step = vec2(0.0);
     }
-    return found;
+    vec2 aside = times(o, across), upright = vec2(n2 * c.y, 0.0);
+    ordinary = unit_wave(mat4x2(-c.y * o, across, -upright, aside), o.y == 0.0);
+    extraordinary = unit_wave(
+        mat4x2(q * c.z * step - aside, -upright, -n2 * (across + c.x * step), -n2 * c.y * (o + step)), e.y == 0.0);
 }
 
-// Power that goes forwards by the interference of one's waves with the other's.
-mat4 power_between(Waves a, Waves b) { return transpose(a.electric) * b.magnetic + transpose(a.magnetic) * b.electric; }
-
-// The inverse of a complex matrix: by its own determinant, which rounding leaves more of than of the real matrix's.
-mat4 complex_inverse(mat4 m) {
-    mat2 a = mat2(m[0].xy, m[1].xy), b = mat2(m[2].xy, m[3].xy), c = mat2(m[0].zw, m[1].zw), d = mat2(m[2].zw, m[3].zw),
-         determinants = a * d - b * c, per = transpose(determinants) / max(determinant(determinants), 1e-30);
-    return mat4(vec4(per * d[0], -per * c[0]), vec4(per * d[1], -per * c[1]), vec4(-per * b[0], per * a[0]),
-        vec4(-per * b[1], per * a[1]));
+// Power that goes forwards by the interference of one wave with another.
+vec2 power_between(mat2x4 a, mat2x4 b) {
+    return vec2(dot(a[0], b[0].zwxy) + dot(a[1], b[1].zwxy), dot(a[0], b[1].zwxy) - dot(a[1], b[0].zwxy));
 }
 
-// What two waves of such amplitudes make of coherent light: its powers in both waves, and real and imaginary part of
-// the first's field times the conjugate of the second's.
-vec4 coherency_after(vec4 light, mat4 amplitudes, vec2 pass) {
-    mat4 after = amplitudes
-        * mat4(light.x, 0.0, light.z, -light.w, 0.0, light.x, light.w, light.z, light.z, light.w, light.y, 0.0,
-            -light.w, light.z, 0.0, light.y)
-        * transpose(amplitudes);
-    return vec4(after[0].x, after[2].z, after[2].xy) * vec4(pass, pass.xx * pass.y);
+vec4 powers_between(Wave a, Wave b[2]) {
+    return vec4(power_between(a.field, b[0].field), power_between(a.field, b[1].field));
 }
 
-// What an interface makes of light: of power 1, as in `coherency_after` by ordinary and extraordinary wave. `before`,
+// What of a coherency two waves carry away.
+vec4 passing(Wave w[2]) {
+    vec2 pass = vec2(w[0].passes, w[1].passes);
+    return vec4(pass, pass.xx * pass.y);
+}
+
+// Powers of two waves, and real and imaginary part of the first's field times the conjugate of the second's.
+vec4 coherency(vec2 first, vec2 second) {
+    return vec4(dot(first, first), dot(second, second), times(first, conjugate(second)));
+}
+
+// What an interface makes of light: of power 1, as in `coherency` by ordinary and extraordinary wave. `before`,
 // `behind`, `wave`, `n`: as of `waves`.
 void cross_interface(
     Uniaxial before, Uniaxial behind, vec3 wave, float n, vec4 light, out vec4 reflected, out vec4 transmitted) {
-    Waves incident = waves(before, wave, n, 1.0), back = waves(before, wave, n, -1.0),
-          onward = waves(behind, wave, n, 1.0);
-    // The fields behind, taken apart into waves before: what comes in, of which an evanescent wave has none.
-    for (int c = 0; c < 4; ++c) {
-        bool passes = incident.pass[c / 2] > 0.0;
-        incident.electric[c] = passes ? incident.electric[c] : back.electric[c];
-        incident.magnetic[c] = passes ? incident.magnetic[c] : back.magnetic[c];
+    Wave onward[2], back[2], incident[2];
+    vec4 goes_back[2], comes_in[2];
+    // The fields behind, taken apart into waves before: what is reflected, and what comes in, of which an evanescent
+    // wave has none.
+    waves(behind, wave, n, 1.0, onward[0], onward[1]);
+    waves(before, wave, n, -1.0, back[0], back[1]);
+    for (int e = 0; e < 2; ++e) goes_back[e] = powers_between(back[e], onward);
+    waves(before, wave, n, 1.0, incident[0], incident[1]);
+    for (int e = 0; e < 2; ++e) comes_in[e] = incident[e].passes ? powers_between(incident[e], onward) : goes_back[e];
+    vec2 determinant = times(comes_in[0].xy, comes_in[1].zw) - times(comes_in[0].zw, comes_in[1].xy),
+         per = conjugate(determinant) / max(dot(determinant, determinant), 1e-30);
+    // The light is two wholly polarised states that do not interfere.
+    float root = sqrt(max(light.x, 1e-20));
+    mat4x2 states = mat4x2(root, 0.0, light.z / root, -light.w / root, 0.0, 0.0,
+        sqrt(max(light.y - dot(light.zw, light.zw) / (root * root), 0.0)), 0.0);
+    reflected = transmitted = vec4(0.0);
+    for (int k = 0; k < 2; ++k) {
+        vec2 first = states[2 * k], second = states[2 * k + 1],
+             o = times(per, times(comes_in[1].zw, first) - times(comes_in[0].zw, second)),
+             e = times(per, times(comes_in[0].xy, second) - times(comes_in[1].xy, first));
+        transmitted += coherency(o, e);
+        reflected += coherency(times(goes_back[0].xy, o) + times(goes_back[0].zw, e),
+            times(goes_back[1].xy, o) + times(goes_back[1].zw, e));
     }
-    mat4 through = complex_inverse(power_between(incident, onward));
-    reflected = coherency_after(light, -power_between(back, onward) * through, back.pass);
-    transmitted = coherency_after(light, through, onward.pass);
+    transmitted *= passing(onward);
+    reflected *= passing(back);
 }

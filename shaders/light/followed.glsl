@@ -141,7 +141,9 @@ FollowedRay follow_specular(
                 if (!columns_hold(path)) keep_anchor(path);
             }
             path.position = surface_point(hit, facet, path.position, path.direction);
-            Event event = interact(path, hit, facet, thing, MicrofacetDraw(0u, number, hash_combine(key, 0x100u)));
+            Event event = meet(path, hit, facet, thing, MicrofacetDraw(0u, number, hash_combine(key, 0x100u)));
+            bool crystal = parts_waves(event, kind);
+            if (!crystal) weigh(path, kind, event);
             bool passes = false, changes = true, geometric;
             vec3 unhidden = vec3(1.0);
             if (HAS_MIRROR && kind == KIND_MIRROR) {
@@ -153,8 +155,7 @@ FollowedRay follow_specular(
                     path.walk.tint[t] *= GATHERED_SPECTRUM ? event_for(path, event, kind, path.walk.x[t]).reflectance
                                                            : film_lobe(path, event, true);
             }
-            bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
-            if (HAS_CRYSTAL && parts_waves)
+            if (HAS_CRYSTAL && crystal)
                 passes = follow_lobe(path, event, thing.texture, unit_float(hash_combine(key, number)));
             if (HAS_POLARISER && kind == KIND_POLARISER) {
                 if (GATHERED_SPECTRUM && thing.medium != NONE) keep_anchor(path);
@@ -162,7 +163,7 @@ FollowedRay follow_specular(
                 for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= share;
                 passes = true;
             }
-            if (HAS_DIELECTRIC && IS_GLASS(kind) && !parts_waves) {
+            if (HAS_DIELECTRIC && IS_GLASS(kind) && !crystal) {
                 changes = event.boundary.changes;
                 float chance = event.reflectance.y;
                 Spectrum spectrum;

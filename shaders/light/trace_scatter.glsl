@@ -58,19 +58,24 @@ void send_parts(uint slot, float at, inout Outcome outcome) {
 #include "light/trace_crystal.glsl"
 #include "path/polariser.glsl"
 
-// Each child is stored in one place, whichever event made it: where every branch is executed, every
-// store costs even when no path takes it. `border`: where the band is cut before it lands; negative: nowhere.
+// Each child is stored in one place, whichever event made it: where every branch is executed, every store costs even
+// when no path takes it. But a crystal's are stored apart, or all that glass holds would be held beside them. `border`:
+// where the band is cut before it lands; negative: nowhere.
 void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object thing, float border, uint slot,
     inout Outcome outcome) {
     bool entering = dot(path.direction, hit.normal_g) < 0.0, lives = false, geometric;
     if ((path.walk.light_and_source >> 16) == 0xffffu)
         path.walk.light_and_source = (path.walk.light_and_source & 0xffffu) | (hit.object << 16);
-    Event event = interact(path, hit, facet, thing, microfacet_draw(path));
+    Event event = meet(path, hit, facet, thing, microfacet_draw(path));
     outcome.what |= event.frame.refused != 0u ? FELL_NORMAL : 0u;
+    if (HAS_CRYSTAL && parts_waves(event, kind)) {
+        part_in_crystal(path, start, hit, event, thing.texture, slot, outcome);
+        return;
+    }
+    weigh(path, kind, event);
     Path child = child_of(path, hit, !entering);
     vec3 unhidden = reflect_path(child, event, geometric);
-    bool parts_waves = HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary);
-    Companions companions = companions_at(path, event, parts_waves ? NONE : kind);
+    Companions companions = companions_at(path, event, kind);
     if (HAS_MIRROR && kind == KIND_MIRROR) {
         vec3 kept = spectral_row(uint(WEIGHT_ROW) + thing.weight_row, path.band),
              of_companions = companion_row(path, uint(WEIGHT_ROW) + thing.weight_row);
@@ -95,12 +100,10 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     }
     Path rest;
     bool rest_lives = false;
-    if (HAS_GRATING || HAS_CRYSTAL) rest = START(start, slot);
+    if (HAS_GRATING) rest = START(start, slot);
     if (HAS_GRATING && kind == KIND_GRATING)
         lives = diffract(path, hit, event, thing.weight_row, child, rest, rest_lives, outcome);
-    if (HAS_CRYSTAL && parts_waves)
-        lives = part_in_crystal(path, hit, event, thing.texture, child, rest, rest_lives, outcome);
-    bool splits = HAS_DIELECTRIC && IS_GLASS(kind) && event.boundary.changes && !parts_waves;
+    bool splits = HAS_DIELECTRIC && IS_GLASS(kind) && event.boundary.changes;
     vec3 let_through = transmittance_of(event);
     float reflected_share = common_share(path, share_of_lobe(event, event.reflectance), companions.reflectance);
     // Refracted they stay together only where nothing disperses.
@@ -155,7 +158,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
 #if defined(HAS_DIELECTRIC) || defined(HAS_GRATING)
     child = child_of(path, hit, entering);
     lives = rest_lives;
-    if ((HAS_GRATING || HAS_CRYSTAL) && rest_lives) child = rest;
+    if (HAS_GRATING && rest_lives) child = rest;
     if (BAND_CUTS && HAS_DIELECTRIC) {
         if (!RAY_POOL && at >= 0.0) {
             child = part_of_band(start, at, start.band.z, 1.0 - below, 6u);

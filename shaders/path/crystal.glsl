@@ -30,6 +30,7 @@ vec2 uniaxial_slopes(uint object, int c, float x) {
 }
 
 #define LOBES 4
+#define NO_SHARE 1e-10  // below this a lobe is what rounding makes of none
 #define LOBE_ONWARD 2u  // bit of a lobe's number: it goes on, not back
 #define LOBE_EXTRAORDINARY 1u  // likewise
 
@@ -39,7 +40,7 @@ struct CrystalEvent {
     bool is_extraordinary;  // the wave that comes in
     vec3 s[3];
     mat3x4 shares;  // of the lobes, at the three places of the band
-    Polarisation state;  // of the lobe on the side that is isotropic
+    Polarisation state;  // of the lobe on the side that is isotropic, counted from s
 };
 
 struct TurnedWave {
@@ -102,24 +103,24 @@ CrystalEvent crystal_event(Path path, Event event) {
     met.from_crystal = crystal_of(event.boundary.before) != NONE;
     met.to_crystal = crystal_of(event.boundary.after) != NONE;
     met.is_extraordinary = met.from_crystal && path.extraordinary != 0u;
-    vec3 normals[3] = vec3[](event.frame.normal, event.frame.normal, event.frame.normal), waves[3],
-         directions[3] = vec3[](path.direction, path.direction, path.direction);
+    vec3 upright = met.from_crystal ? across_direction(event.frame.normal) : path.polarisation.axis,
+         normals[3] = vec3[](event.frame.normal, event.frame.normal, event.frame.normal),
+         waves[3] = vec3[](path.direction, path.direction, path.direction);
     if (SPECTRAL_GROUPS > 0 && path.restricted != 0u) {
         for (int end = 0; end < 2; ++end) {
-            directions[2 * end] = direction_at_end(path, end);
+            waves[2 * end] = direction_at_end(path, end);
             normals[2 * end] = normalize(normal_at_end(path, event, end));
         }
     }
-    vec3 upright = met.from_crystal ? across_direction(event.frame.normal) : path.polarisation.axis;
     for (int i = 0; i < 3; ++i) {
         Uniaxial before = uniaxial_at(event.boundary.before, path.band[i], normals[i]);
-        waves[i] = wave_of_ray(of_kind(before, met.is_extraordinary), directions[i]);
+        waves[i] = wave_of_ray(of_kind(before, met.is_extraordinary), waves[i]);
         met.s[i] = incidence_axis(normalize(waves[i]), normals[i], upright);
     }
     vec4 exist;
     for (int lobe = 0; lobe < LOBES; ++lobe)
         exist[lobe] = float(turn_wave(met, event, uint(lobe), path.direction, event.frame.normal, path.band.y).exists);
-    Polarisation seen = in_plane(path.polarisation, path.direction, met.s);
+    met.state = in_plane(path.polarisation, path.direction, met.s);
     for (int i = 0; i < 3; ++i) {
         // Axes of the interface: along the plane of incidence, s and forwards.
         mat3 axes = mat3(-cross(met.s[i], normals[i]), met.s[i], -normals[i]);
@@ -129,7 +130,8 @@ CrystalEvent crystal_event(Path path, Event event) {
         behind.axis *= axes;
         vec3 wave = waves[i] * axes;
         vec4 light = vec4(float(!met.is_extraordinary), float(met.is_extraordinary), 0.0, 0.0), back, onward;
-        if (!met.from_crystal) light = 0.5 * vec4(1.0 + seen.q[i], 1.0 - seen.q[i], seen.u[i], seen.v[i]);
+        if (!met.from_crystal)
+            light = 0.5 * vec4(1.0 + met.state.q[i], 1.0 - met.state.q[i], met.state.u[i], met.state.v[i]);
         cross_interface(before, behind, vec3(wave.x, 0.0, max(wave.z, 1e-6)), length(waves[i]), light, back, onward);
         vec4 one = met.from_crystal ? onward : back;
         float power = one.x + one.y;
@@ -140,9 +142,9 @@ CrystalEvent crystal_event(Path path, Event event) {
         if (!met.from_crystal) back.xy = vec2(power, 0.0);
         if (!met.to_crystal) onward.xy = vec2(power, 0.0);
         vec4 shares = vec4(back.xy, onward.xy) * exist;
+        shares *= step(NO_SHARE, shares);
         met.shares[i] = shares / max(dot(shares, vec4(1.0)), 1e-20);
     }
-    met.state.axis = met.s[1];
     return met;
 }
 

@@ -248,26 +248,32 @@ Event event_for(Path path, Event event, uint kind, vec3 x) {
 // Whether an event's glass refracts the ends of the band differently.
 bool parts_wavelengths(Event event) { return event.n_i.x * event.n_t.z != event.n_i.z * event.n_t.x; }
 
-// What a path meets, as far as no chance and no walk decides it: normals, media, shares. `draw`: which microfacet of a
-// ground surface it meets.
-Event interact(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {
+// What a path meets but for its shares: normals and media. `draw`: which microfacet of a ground surface it meets.
+Event meet(Path path, Hit hit, Triangle facet, Object thing, MicrofacetDraw draw) {
     Event event = event_at(path, hit, facet);
     if (ROUGH_SURFACES && (thing.kind == KIND_DIELECTRIC || thing.kind == KIND_MIRROR))
         meet_microfacet(path, thing, draw, event);
     if (HAS_DIELECTRIC && IS_GLASS(thing.kind))
         event.boundary = cross_boundary(path.medium, hit.object, dot(path.direction, hit.normal_g) < 0.0);
     if (HAS_FILM) event.film = film_met(path, hit, thing, event.boundary);
-    if (HAS_DIELECTRIC && IS_GLASS(thing.kind)) {
-        if (!(HAS_CRYSTAL && meets_crystal(event.boundary))) share_out(path, thing.kind, event);
-    } else {
-        if (POLARISED) see_polarised(path, event);
-        if (HAS_FILM && FILM_MET(event)) {
-            event.theta = incidence_over_band(path, event);
-            share_at(path.band, false, thing.kind, event);
-        } else if (ROUGH_SURFACES)
-            event.reflectance = reflected_in_all(vec3(1.0), event.ground.thrown);
-    }
     return event;
+}
+
+// Whether a crystal is on either side of it: its waves have shares of their own (`crystal_event`).
+bool parts_waves(Event event, uint kind) { return HAS_CRYSTAL && IS_GLASS(kind) && meets_crystal(event.boundary); }
+
+// Shares of all else.
+void weigh(Path path, uint kind, inout Event event) {
+    if (HAS_DIELECTRIC && IS_GLASS(kind)) {
+        share_out(path, kind, event);
+        return;
+    }
+    if (POLARISED) see_polarised(path, event);
+    if (HAS_FILM && FILM_MET(event)) {
+        event.theta = incidence_over_band(path, event);
+        share_at(path.band, false, kind, event);
+    } else if (ROUGH_SURFACES)
+        event.reflectance = reflected_in_all(vec3(1.0), event.ground.thrown);
 }
 
 // Share of a path that a microfacet has turned which others do not hide or send on, over its band; nothing where it
