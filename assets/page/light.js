@@ -174,6 +174,7 @@ export class Light {
       this.use(kind, { records, paths: this.paths, light: this.light, edges: this.edges });
       gl.uniform2f(kind.at("support"), ...this.tables.support);
       gl.uniform1i(kind.at("lines"), this.tables.lineCount);
+      gl.uniform1f(kind.at("finest"), step > 1 ? 1 : 4);
       if (kind === this.splats) gl.uniform1f(kind.at("smoothing"), head.photons.smoothing * Math.sqrt(each));
       gl.drawElements(gl.TRIANGLES, 6 * drawn, gl.UNSIGNED_INT, 0);
       this.draws++;

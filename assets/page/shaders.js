@@ -62,15 +62,14 @@ float excess(float z) { return normal(z) - z * (1.0 - below_normal(z)); }
 `;
 
 export const SPLAT_VERTEX = COMMON + TABLES + RECORDS(6) + GAUSSIAN + `
-uniform float smoothing;
+uniform float smoothing, finest;  // spacings; parts of a texel's side in which what is small is drawn
 vec4 place_v2;  // where the anchor lands; change with the third index
 vec4 v01;       // change with the first and the second index
 vec4 span;      // x: from, anchor, to; row of the light's table
-flat out vec4 band;       // x: from, anchor, to; standard deviation
-flat out vec3 weights;    // throughput at the anchor, its slopes below and above
-flat out vec3 shape;      // half a texel across; 1 / standard deviation along; row
-flat out vec3 ripple;
-flat out vec4 rect;
+flat out vec4 band, rect;  // x: from, anchor, to; standard deviation; texels of its level
+flat out vec4 shape;      // half a texel across, along; 1 / its width; row
+flat out vec3 weights, ripple;  // throughput at the anchor, its slopes below and above; waves' heights
+flat out float fine;      // parts of a texel's side, each of which is drawn
 out vec4 at;              // across, along (0 to 1), cycles
 out float lit;            // how far inside of the light's edge, 0 to 1 over its blur
 const float TEXEL = 1.0 / 12.0, NARROWED = 0.4 / 0.45;
@@ -104,7 +103,8 @@ vec2 along, across;
 float shear, box, across2, along2;
 float damping(vec2 k, float swept) {
   float ka = dot(k, along), kc = dot(k, across) + shear * ka;
-  return exp(-0.5 * TWO_PI * TWO_PI * (across2 * kc * kc + along2 * ka * ka)) * sinc(box * kc) * sinc(swept * ka);
+  return exp(-0.5 * TWO_PI * TWO_PI * (across2 * kc * kc + along2 * ka * ka)) * sinc(box * kc)
+    * sinc(box * ka) * sinc(swept * ka);
 }
 float kept(float edge, float wide, float s) {
   return 1.0 - 2.0 * s / wide * (excess((edge - 0.5 * wide) / s) - excess((edge + 0.5 * wide) / s));
@@ -138,12 +138,14 @@ void main() {
   float length2 = dot(longest, longest);
   if (smoothed * sqrt(length2) > 0.75) fan += widens / length2 * longest;
   s *= smoothed; t *= smoothed;
-  // Broad photons go to coarser texels, whose bilinear reading blurs them too.
+  // Broad photons go to coarser texels, whose bilinear reading blurs them too; small ones are drawn in parts of a texel.
   vec3 cov = vec3(s.x * s.x + t.x * t.x, s.x * s.y + t.x * t.y, s.y * s.y + t.y * t.y);
   float difference = 0.5 * (cov.x - cov.z), radius = sqrt(difference * difference + cov.y * cov.y);
-  float thin = 0.5 * (cov.x + cov.z) - radius, taken = 0.0, finer = 1.0;
+  vec3 areas = vec3(cross2(s, t), 0.25 * sqrt(TEXEL) * vec2(cross2(s, chord), cross2(t, chord)));
+  fine = dot(areas, areas) < 0.09 ? finest : 1.0;
+  float thin = 0.5 * (cov.x + cov.z) - radius, taken = 0.0, finer = fine;
   int level = 0;
-  for (int k = 1; k < LEVELS; ++k)
+  for (int k = 1; k < LEVELS && fine == 1.0; ++k)
     if (thin * finer * finer > 2.25) { level = k; finer *= 0.5; taken = 0.25 * taken + 11.0 / 48.0; }
   s *= finer; t *= finer; chord *= finer; centre *= finer; cov *= finer * finer; radius *= finer * finer;
   difference *= finer * finer; thin *= finer * finer; fan /= finer;
@@ -159,29 +161,20 @@ void main() {
   float a = sa.x * sa.x + ta.x * ta.x, b = sa.x * sa.y + ta.x * ta.y, c = sa.y * sa.y + ta.y * ta.y;
   cell = cross2(sa, ta);
   float determinant = cell * cell - taken * (a + c - taken);
-  a -= taken;
-  c -= taken;
-  // Across: a box as wide as a texel there, and the rest of the texel as a Gaussian.
+  a -= taken; c -= taken;
+  // Across and along: a box as wide as a texel there, and the rest of the texel as a Gaussian.
   box = max(abs(m.x), abs(m.y));
   float narrow = min(abs(m.x), abs(m.y));
   across2 = max(c + blur, 0.01) + narrow * narrow * TEXEL;
   float total = across2 + box * box * TEXEL;
   shear = b / total;
-  along2 = max(TEXEL + (a * (total - c) + determinant) / total, 0.12 * (1.0 + shear * shear));
-  along = e;
-  across = m;
-  float sigma = sqrt(along2), root = sqrt(across2);
+  along2 = max((a * (total - c) + determinant) / total + narrow * narrow * TEXEL, 0.01 + 0.12 * shear * shear);
+  along = e; across = m;
+  float sigma = sqrt(along2 + box * box * TEXEL), root = sqrt(across2);
   sweep = max(sweep, 0.03 * sigma);
-  float reach = 0.5 * sweep + 3.0 * sigma, edge = 3.0 * sqrt(total);
+  float beside = 0.75 * (fine - 1.0), reach = 0.5 * sweep + 3.0 * sigma + beside, edge = 3.0 * sqrt(total) + beside;
   vec2 long_side = e * reach, short_side = (m + shear * e) * edge;
-  // The texels' centres see some of its harmonics too (Poisson).
-  float grid = 1.0;
-  for (int i = 0; i < 4 && min(across2, along2) < 0.5; ++i) {
-    vec2 k = i == 0 ? vec2(1, 0) : i == 1 ? vec2(0, 1) : i == 2 ? vec2(1, 1) : vec2(1, -1);
-    grid += 2.0 * damping(k, sweep) * cos(TWO_PI * dot(k, centre - 0.5));
-  }
-  float amplitude = 1.0
-    / (box * kept(edge, box, root) * kept(reach, sweep, sigma) * clamp(grid, 0.7, 1.4));
+  float amplitude = 1.0 / (box * kept(edge, box, root) * kept(reach, sweep, sigma));
   // What fans out too far along one axis is not drawn there, and the rest is brighter for it (shaders/lib/fan.glsl there).
   vec2 corner = corner(), widening = vec2(dot(fan, long_side), dot(fan, short_side));
   widening *= min(1.0, min(3.0 / max(length(fan) * sqrt(thin + 2.0 * radius), 1e-9),
@@ -195,10 +188,8 @@ void main() {
   amplitude *= 2.0 * kept(reach, sweep, sigma) / (kept(reach, sweep, sigma) + kept(ends.x * reach, sweep, sigma));
   amplitude *= 2.0 * kept(edge, box, root) / (kept(edge, box, root) + kept(ends.y * edge, box, root));
   // Splats about a lattice's points add up to 1 and a ripple, which each takes off.
-  ripple = vec3(0.0);
-  at.zw = vec2(0.0);
-  lit = 1.0;
-  float swept = sweep * sweep * TEXEL, share = swept / (along2 + swept);
+  ripple = vec3(0.0); at.zw = vec2(0.0); lit = 1.0;
+  float swept = sweep * sweep * TEXEL, share = swept / (sigma * sigma + swept);
   mat2 to_spacings = smoothed / cell * mat2(t.y, -t.x, -s.y, s.x);
   if (lattice && abs(cell) > 1e-6) {
     vec2 steps[3], k[3];
@@ -210,7 +201,7 @@ void main() {
       float turns2 = smoothed * smoothed * dot(steps[i], steps[i]) - taken * dot(k[i], k[i]);
       float most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * max(turns2, 0.0));
       heights[i] = clamp(damping(k[i], 0.0), 0.0, most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
-      seen[i] = 2.0 * exp(-0.5 * ka * ka * share * along2);
+      seen[i] = 2.0 * exp(-0.5 * ka * ka * share * sigma * sigma);
     }
     vec3 less = heights - 2.0 * heights.yxx * heights.zzy;
     ripple = less * seen;
@@ -222,7 +213,7 @@ void main() {
   if (origin.y > 0.0 && abs(cell) > 1e-6) {
     float turn = TWO_PI / 4096.0 * floor(origin.y / 4096.0), inside = (2.0 * mod(origin.y, 4096.0) - 1.0) / 4095.0 - 1.0;
     vec2 within = to_spacings * vec2(cos(turn), sin(turn));
-    float ahead = dot(within, e), variance = dot(within, within) * TEXEL + ahead * ahead * share * along2;
+    float ahead = dot(within, e), variance = dot(within, within) * TEXEL + ahead * ahead * share * sigma * sigma;
     if (variance < 0.16) {
       float sharp = sqrt(TEXEL / max(variance, 1e-12));
       lit = 0.5 + sharp * (inside + (1.0 - share) * corner.x * dot(within, long_side) + corner.y * dot(within, short_side));
@@ -230,54 +221,63 @@ void main() {
     }
   }
   at.xy = vec2(corner.y * edge * SQRT_HALF / root, 0.5 + corner.x * reach / sweep);
-  band = vec4(x_lo, span.y, x_hi, sigma / sweep);
+  band = vec4(x_lo, span.y, x_hi, sqrt(along2) / sweep);
   weights = amplitude * vec3(carried.y, (carried.y - carried.x) / max(span.y - span.x, 1e-6),
     (carried.z - carried.y) / max(span.z - span.y, 1e-6));
-  shape = vec3(0.5 * box * SQRT_HALF / root, 1.0 / sigma, span.w);
+  shape = vec4(0.5 * box * SQRT_HALF / root, 0.5 * box / sweep, 1.0 / box, span.w);
   rect = rect_of(level);
-  vec2 beside = corner.x * long_side + corner.y * short_side;
+  vec2 away = (corner.x * long_side + corner.y * short_side) / fine;
   float w = 1.0 + dot(widening, corner);
-  gl_Position = vec4(((rect.xy + centre) * w + beside) / vec2(1.5 * float(size.x), size.y) * 2.0 - w, 0.0, w);
+  gl_Position = vec4(((rect.xy + centre / fine) * w + away) / vec2(1.5 * float(size.x), size.y) * 2.0 - w, 0.0, w);
 }`;
 
 export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + `
-flat in vec4 band, rect;
-flat in vec3 weights, shape, ripple;
+flat in vec4 band, rect, shape;
+flat in vec3 weights, ripple;
+flat in float fine;
 in vec4 at;
 in float lit;
 out vec4 deposited;
-float carried_at(float x) {
-  return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0);
+float carried_at(float x) { return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0); }
+float share_of(float away, float half_texel, float scale) {
+  return 0.5 * (error_function(min((away + half_texel) * scale, 6.0)) - error_function(max((away - half_texel) * scale, -6.0)));
 }
-void main() {
-  if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
-  float w = 1.0 / gl_FragCoord.w;
-  float share = w * w * 0.5 * (error_function(min(at.x + w * shape.x, 6.0)) - error_function(max(at.x - w * shape.x, -6.0)));
-  share *= clamp(lit, 0.0, 1.0);
+// What a texel gets, or a part of one, whose middle is there.
+vec3 light_at(vec4 at) {
   vec3 away = abs(fract(vec3(at.zw, at.z + at.w)) * 2.0 - 1.0);
+  float w = 1.0 / gl_FragCoord.w, share = w * w * share_of(at.x, w * shape.x, 1.0);
   share *= 1.0 - dot(ripple, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);
-  int row = int(shape.z);
-  // What lands within three standard deviations, in parts: their light times a normal density at their middles, less
-  // wide by what a part's own width adds.
-  float s = band.w, from = clamp(at.y - 3.0 * s, 0.0, 1.0), to = clamp(at.y + 3.0 * s, 0.0, 1.0);
-  int parts = clamp(int(ceil(1.3 * (to - from) / s)), 3, 8);
-  float step_way = (to - from) / float(parts), own = sqrt(s * s - step_way * step_way / 12.0);
+  // What lands within three standard deviations of the texel, in parts: their light times the share of what is spread
+  // about their middles that the texel gets along the sweep.
+  float s = band.w, reach = shape.y + 3.0 * s, from = clamp(at.y - reach, 0.0, 1.0), to = clamp(at.y + reach, 0.0, 1.0);
+  int row = int(shape.w), parts = clamp(int(ceil(1.3 * (to - from) / s)), 3, 8);
+  float step_way = (to - from) / float(parts), own = SQRT_HALF / sqrt(max(s * s - step_way * step_way / 12.0, 0.25 * s * s));
   float x_from = mix(band.x, band.z, from);
   vec3 sum = vec3(0.0), before = energy_below(row, x_from);
   for (int i = 1; i <= parts; ++i) {
     float way = from + float(i) * step_way, x = mix(band.x, band.z, way);
     vec3 now = energy_below(row, x);
-    sum += (now - before) * normal((way - 0.5 * step_way - at.y) / own) * carried_at(0.5 * (x_from + x));
+    sum += (now - before) * share_of(way - 0.5 * step_way - at.y, shape.y, own) * carried_at(0.5 * (x_from + x));
     before = now;
     x_from = x;
   }
-  sum *= shape.y * s / own;
   for (int k = 0; k < lines; ++k) {
     vec4 line = line_of(row, k);
     if (line.w < band.x || line.w >= band.z) continue;
-    sum += line.rgb * normal(((line.w - band.x) / (band.z - band.x) - at.y) / s) * shape.y * carried_at(line.w);
+    sum += line.rgb * share_of((line.w - band.x) / (band.z - band.x) - at.y, shape.y, SQRT_HALF / s) * carried_at(line.w);
   }
-  deposited = vec4(share * sum, 0.0);
+  return shape.z * share * sum;
+}
+void main() {
+  vec4 right = dFdx(at), up = dFdy(at);
+  vec3 lits = vec3(lit, dFdx(lit), dFdy(lit));
+  if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < int(fine * fine); ++i) {
+    vec2 beside = (vec2(i % int(fine), i / int(fine)) + 0.5) / fine - 0.5;
+    sum += clamp(dot(lits, vec3(1.0, beside)), 0.0, 1.0) * light_at(at + beside.x * right + beside.y * up);
+  }
+  deposited = vec4(sum, 0.0);
 }`;
 
 export const BEAM_VERTEX = COMMON + TABLES + RECORDS(5) + `
@@ -404,18 +404,17 @@ void main() {
   sides = mat2(to_uv[0].xy - uv * to_uv[0].z, to_uv[1].xy - uv * to_uv[1].z) / uvw.z;
   float wide = band.y - band.x;
   vec2 lit = wide > 0.0 ? (clamp(support, band.xx, band.yy) - band.x) / wide : vec2(0.0, 1.0), touched = lit, whole = lit;
-  float moves = 0.0;  // texels, of the edges that matter
+  float moves = 0.0;  // sixteenths of a texel, of the edges that matter
   for (int i = 0; i < list.y; ++i) {
     vec4 start = edge_texel(2 * (list.x + i)), from = seen_line(start), to = seen_line(start + edge_texel(2 * (list.x + i) + 1));
     float h = from.z, dh = to.z - h, r = 0.5 * (abs(from.x) + abs(from.y)) * from.w;
     float dr = 0.5 * (abs(to.x) + abs(to.y)) * to.w - r;
     vec2 touches = positive(h + r, dh + dr), covers = positive(h - r, dh - dr);
-    if (covers.x > lit.x || covers.y < lit.y) moves = max(moves, abs(dh / from.w) / length(from.xy));
+    if (covers.x > lit.x || covers.y < lit.y) moves = max(moves, 16.0 * abs(dh / from.w) / length(from.xy));
     touched = vec2(max(touched.x, touches.x), min(touched.y, touches.y));
     whole = vec2(max(whole.x, covers.x), min(whole.y, covers.y));
   }
   if (touched.x > touched.y) discard;
-  moves *= 3.0;
   if (whole.x < whole.y) {
     add(whole, 3, true);
     if (whole.x > touched.x) add(vec2(touched.x, whole.x), clamp(int(ceil(moves * (whole.x - touched.x))), 1, 4), false);

@@ -16,6 +16,7 @@ from interface.page_pixels import BALL
 from PIL import Image
 from spectrasplat.base.errors import UserError
 from spectrasplat.render.export_caustic import check_export
+from spectrasplat.render.page.document import packed_bytes
 from spectrasplat.render.page.page import check_page, check_page_path, decimated
 
 
@@ -49,6 +50,14 @@ def test_a_page_asks_nothing_of_a_network(tmp_path: Path) -> None:
     # The photons' places are where the picture's pixels look: the ball's shadow is amid the table.
     weight = np.asarray(Image.open(io.BytesIO(page.arrays["weight"].tobytes())))
     assert weight.shape == (36, 64, 3) and weight[-1].min() > 250 and weight[:18].min() == 0
+
+
+def test_a_page_has_as_many_photons_as_its_file_has_room_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spectrasplat.render.page.page._ROOM", 60_000)
+    page = ss.page(ss.Scene(BALL), size=(64, 36), photons=4000)
+    light = {name: values for name, values in page.arrays.items() if name.startswith("photons.")}
+    assert 30_000 < packed_bytes(light) < 60_000
+    assert re.match(r"This page holds the light of [\d,]+ photons, not of the 4,000", page.head["notes"][0])
 
 
 def test_where_no_light_falls_there_is_no_page() -> None:

@@ -26,18 +26,28 @@ _EXPORT = re.compile(r"^export (?=\w)", re.MULTILINE)
 
 def data_elements(arrays: Mapping[str, np.ndarray], head: Mapping[str, Any]) -> str:
     """The two script elements that hold a page's data (docs/pages.md)."""
+    packed, listed = _packed(arrays)
+    text = json.dumps({**head, "arrays": listed}, ensure_ascii=False, allow_nan=False)
+    return (
+        f'<script type="application/json" id="head">{text.replace("<", chr(92) + "u003c")}</script>\n'
+        f'<script type="text/plain" id="blob">{packed}</script>\n'
+    )
+
+
+def packed_bytes(arrays: Mapping[str, np.ndarray]) -> int:
+    """Of `arrays` in a page's file."""
+    return len(_packed(arrays)[0])
+
+
+def _packed(arrays: Mapping[str, np.ndarray]) -> tuple[str, dict[str, Any]]:
+    """All of them, deflated, base64; and where each lies in that."""
     blob, listed = bytearray(), {}
     for name, values in arrays.items():
         blob += bytes(-len(blob) % 4)
         data = np.ascontiguousarray(values)
         listed[name] = {"dtype": _DTYPES[data.dtype.name], "shape": list(data.shape), "offset": len(blob)}
         blob += data.astype(data.dtype.newbyteorder("<")).tobytes()
-    text = json.dumps({**head, "arrays": listed}, ensure_ascii=False, allow_nan=False)
-    packed = base64.b64encode(zlib.compress(bytes(blob), 6)).decode()
-    return (
-        f'<script type="application/json" id="head">{text.replace("<", chr(92) + "u003c")}</script>\n'
-        f'<script type="text/plain" id="blob">{packed}</script>\n'
-    )
+    return base64.b64encode(zlib.compress(bytes(blob), 6)).decode(), listed
 
 
 def document(arrays: Mapping[str, np.ndarray], head: Mapping[str, Any]) -> str:

@@ -6,30 +6,42 @@ where depends on the index alone, and another dispersion moves wavelengths along
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...base.errors import UserError
-from ...gpu.records import EDGE_BIT, LATTICE_BIT
+from ...gpu.packed_records import read_records
+from ...gpu.records import EDGE_BIT, LATTICE_BIT, photon_record_of
 from ...gpu.spectral_groups import samples_of
 from ...model.optics.colorimetry import VISIBLE_NM
+from ...passes.map_layout import LIVE
 from ...passes.plane_frame import PlaneFrame, plane_frame
+from ..device_scene import scene_buffers
+from ..light_pass import LightPass
+from ..map_fit import MapFit
+from ..photon_records import NoRecords
 
 if TYPE_CHECKING:
-    from ..viewer.live_light import LiveLight
+    import moderngl
+
+    from ...beams.polygons import BeamPolygons
+    from ...gpu.context import Context
+    from ...gpu.schema import Struct
+    from ...model.scene import Scene
+    from ...model.settings import RenderSettings
+    from ...passes.trace import Batch
+    from ..photon_records import RoundOf
     from .spectra import Glasses
 
 _LIT = 0.8
 """Share along either axis of what views from above and all round begin with."""
+_FINER_BEAMS = 4
+"""Times as many photons whose time is taken where beams carry all but what is weak."""
 _MOST = 6e4
 """Of columns: what half floats hold. Longer ones are shortened; where one is no number, light falls on a point."""
-_FINER_BEAMS = 4.0
-"""Times as many photons whose time beams may take where they carry all light."""
-_MOST_EDGES = 140_000
-"""Of polygons: 8 MB on a page, about."""
 
 
 @dataclass(frozen=True)
@@ -45,9 +57,78 @@ class PageLight:
     """The receiver in the scene's objects."""
 
 
-def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
-    """The light of `light`, traced through `glasses.traced`, on receiver number `receiver`. Raises `UserError` where
-    there is none."""
+class _Read(NoRecords):
+    """`PhotonRecords` of a pass, read back. Photons that carry on weak beams are taken, since the same change of index
+    moves them and the polygons of strong ones."""
+
+    keeps = takes_tails = True
+
+    def __init__(self, photon: Struct) -> None:
+        super().__init__()
+        self._photon = photon
+        self._read = [photon.zeros(0)]
+
+    def keep(self, photons: moderngl.Buffer, batch: Batch, stride: int, of: RoundOf) -> None:
+        """Read the batch."""
+        self._read.append(read_records(self._photon, photons, batch.photons))
+
+    @property
+    def records(self) -> np.ndarray:
+        """All that were kept."""
+        return np.concatenate(self._read)
+
+
+class TracedLight:
+    """The light of one pass: the photons and the polygons that it is made of. Owns the scene's buffers as well."""
+
+    def __init__(self, context: Context, scene: Scene, settings: RenderSettings) -> None:
+        """`settings` with a number of photons."""
+        self.scene, self._seed, self.photons = scene, settings.seed, settings.photons or 1
+        self.buffers = scene_buffers(context, scene, settings)
+        features = self.buffers.features
+        self._read = _Read(photon_record_of(features, context.traits.packs_records))
+        fit = MapFit(scene.camera, settings.width, settings.height, LIVE)
+        self.light_pass = LightPass(
+            context, scene, settings, features, self.buffers, fit=fit, photon_records=self._read
+        )
+
+    def steps(self) -> Generator[float]:
+        """Trace it, pausing with the share done."""
+        for _ in self.light_pass.preparing():
+            yield 0.0
+        if self.light_pass.survey.only_beams:
+            self.photons *= _FINER_BEAMS
+        self.light_pass.begin(self.photons, self._seed)
+        for step in self.light_pass.pass_steps(0, self.photons):
+            yield step.fraction
+
+    def photons_on(self, receiver: int) -> np.ndarray:
+        """Records (`gpu.records.photon_record_of`) on a receiver; their flux is power times the pass's photons."""
+        return self._read.records[self._read.records["receiver"] == receiver]
+
+    def polygons_on(self, receiver: int) -> BeamPolygons | None:
+        """Those of beams on a receiver; None without beams."""
+        beams = self.light_pass.survey.beams
+        if beams is None or beams.found is None or beams.found.polygons is None:
+            return None
+        return beams.found.polygons.where(beams.found.polygons.receiver == receiver)
+
+    def landed(self, receiver: int) -> float:
+        """W on a receiver."""
+        total, polygons = float(self.photons_on(receiver)["flux_w"].sum()), self.polygons_on(receiver)
+        total /= self.photons
+        watts = np.array([float(power.band(0.0, 1.0)[3]) for power in self.buffers.light_power])
+        return total + (0.0 if polygons is None else float((polygons.flux * watts[polygons.light]).sum()))
+
+    def release(self) -> None:
+        """Free everything."""
+        self.light_pass.release()
+        self.buffers.release()
+
+
+def page_light(light: TracedLight, receiver: int, glasses: Glasses) -> PageLight:
+    """What `light`, traced through `glasses.traced`, holds on receiver number `receiver`. Raises `UserError` where that
+    is nothing."""
     buffers = light.buffers
     item = buffers.receivers[receiver]
     frame = plane_frame(buffers.space.to_gpu(buffers.world_meshes[item].vertices))
@@ -66,7 +147,7 @@ def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
     photons = _photons(light, receiver, frame, to_page)
     beams, flux = _beams(light, receiver, frame, to_page)
     if not len(photons["x"]) and not len(beams["x"]):
-        name = light.light_pass.scene.objects[item].name
+        name = light.scene.objects[item].name
         raise UserError(f"no caustic falls on '{name}': choose another receiver, or aim a light at glass near it")
     head["lit"] = _lit(photons, beams, flux)
     unit = float(photons["throughput"].max(initial=0.0)) or 1.0
@@ -84,40 +165,9 @@ def page_light(light: LiveLight, receiver: int, glasses: Glasses) -> PageLight:
     return PageLight(arrays, head, frame, item)
 
 
-def beams_alone(light: LiveLight, photons: int) -> Iterator[None]:
-    """Find the beams again: all of them, as weak ones that photons carried on are not stored; more where no photons
-    are, but no more than a page has room for."""
-    found, finer = light.light_pass.survey, _FINER_BEAMS if light.only_beams else 1.0
-    while found.beams is not None:
-        yield from light.light_pass.beam_steps_again(finer * photons)
-        polygons = found.beams.found.polygons if found.beams.found is not None else None
-        if finer <= 1.0 or polygons is None or len(polygons.edges) <= _MOST_EDGES:
-            return
-        finer *= 0.5
-
-
-def landed(light: LiveLight, receiver: int) -> float:
-    """Light that lands on a receiver, about, by photons and polygons."""
-    beams, weights = light.light_pass.survey.beams, light.buffers.light_power
-    watts = np.array([float(power.band(0.0, 1.0)[3]) for power in weights])
-    total = 0.0
-    if (stored := light.stored.fullest) is not None:
-        records = stored.store.read(1 << 16, light.light_pass.trace.photon)
-        mine = records[records["receiver"] == receiver]
-        total += float(mine["flux_w"].sum()) / max(stored.pass_photons * stored.store.some(1 << 16)[2], 1e-300)
-    if beams is not None and beams.found is not None and beams.found.polygons is not None:
-        polygons = beams.found.polygons
-        total += float((polygons.flux * watts[polygons.light])[polygons.receiver == receiver].sum())
-    return total
-
-
-def _photons(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -> dict[str, np.ndarray]:
-    stored, photon = light.stored.fullest, light.light_pass.trace.photon
-    records = photon.zeros(0) if stored is None else stored.store.read(1 << 30, photon)
-    records = records[records["receiver"] == receiver]
+def _photons(light: TracedLight, receiver: int, frame: PlaneFrame, to_page: Any) -> dict[str, np.ndarray]:
+    records = light.photons_on(receiver)
     scale, groups = light.buffers.space.scale, light.buffers.groups.count
-    weight = 1.0 if stored is None else stored.pass_photons * stored.store.rounds / stored.store.rounds_of_pass
-
     names = ["dposition_ds", "dposition_dt", *(f"dposition_dvar{g}" for g in range(groups))]
     columns = np.stack([records[name][:, :3].astype(float) @ frame.axes.T / scale for name in names], axis=1)
     columns[~np.isfinite(columns).all(axis=(1, 2))] = 0.0
@@ -128,7 +178,7 @@ def _photons(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -
         "axis_t": columns[:, 1].astype("f2"),
         "dposition_dn": columns[:, 2:].astype("f2"),
         "x": to_page(np.stack([records[name] for name in ("x_lo", "x_anchor", "x_hi")], axis=1)),
-        "throughput": records["throughput"].astype(float) / max(weight, 1e-300),
+        "throughput": records["throughput"].astype(float) / light.photons,
         "light": (records["light_and_source"] & 255).astype("u1"),
         "lattice": (records["flags"] >> LATTICE_BIT).astype("u4"),
         "edge": (records["depth"] >> EDGE_BIT).astype("u4"),
@@ -137,17 +187,14 @@ def _photons(light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any) -
 
 
 def _beams(
-    light: LiveLight, receiver: int, frame: PlaneFrame, to_page: Any
+    light: TracedLight, receiver: int, frame: PlaneFrame, to_page: Any
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Polygons, and the light that each holds, relative."""
-    beams = light.light_pass.survey.beams
-    polygons = None if beams is None or beams.found is None else beams.found.polygons
-    if polygons is None:
+    polygons, beams = light.polygons_on(receiver), light.light_pass.survey.beams
+    if polygons is None or beams is None:
         return {"x": np.zeros((0, 2))}, np.zeros(0)
-    assert beams is not None
     own, scale = beams.frames[receiver], light.buffers.space.scale
     assert np.allclose(own.axes, frame.axes), "beams lie in the frame of their receiver"
-    polygons = polygons.where(polygons.receiver == receiver)
     shift = (own.origin - frame.origin) @ frame.axes.T
     edges = polygons.edges.copy().reshape(-1, 2, 4)
     edges[..., 2] -= edges[..., :2] @ shift

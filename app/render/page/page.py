@@ -9,7 +9,7 @@ from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,17 +28,12 @@ from ...model.optics.spectrum import Spectrum
 from ...model.scene import Scene, SceneObject
 from ...model.settings import RenderSettings
 from ..bake import check_receiver
-from ..frame_fit import inputs_of
 from ..frames import FrameRenderer
 from ..lit_receiver import up_of
-from ..viewer.still_engine import finishing, still_engine
-from .document import document
-from .light import beams_alone, landed, page_light
+from .document import document, packed_bytes
+from .light import PageLight, TracedLight, page_light
 from .picture import first_look, page_picture, pixels_to_plane, weight_of
 from .spectra import GAIN_MAX, Glasses, offered_spectra
-
-if TYPE_CHECKING:
-    from ..viewer.live_light import LiveLight
 
 DEFAULT_PHOTONS = 100_000
 DEFAULT_WIDTH = 720
@@ -59,6 +54,12 @@ _MADE = (
     "Made with SpectraSplat {} from {}, receiver {}. The photons are stored with their dispersion still open: nothing "
     "is traced here, and nothing is loaded from anywhere."
 )
+_FEWER = (
+    "This page holds the light of {:,} photons, not of the {:,} that were asked for, as its file would be too large: "
+    "it has {:.1f} times as much noise."
+)
+_ROOM = 7_000_000
+"""Bytes that the light of a page of up to `DEFAULT_PHOTONS` may have in its file; of more photons, as many more."""
 _LIGHT_SHARE = 0.5
 """Of the time, for what is traced to be kept."""
 
@@ -158,24 +159,17 @@ def page_steps(
     if glasses.own is None:  # beams have no columns by which another glass moves them
         alone = len(dispersive_glasses(scene)) <= MOST_GROUPS
         settings = replace(settings, method="srd-photons" if alone else "srd-lambda")
-    engine = still_engine(context, replace(settings, spp=1), exact=False)
+    widened = replace(glasses.widened(scene), camera=stage.camera)
+    traced, light = yield from _tracing(context, widened, settings, receiver, glasses)
     try:
-        engine.set(inputs_of(Stage(glasses.widened(scene), stage.camera), settings))
-        for share in finishing(engine, settings.photons or 1):
-            yield _LIGHT_SHARE * share
-        live = engine.live_light
-        assert live is not None
-        for _ in beams_alone(live, settings.photons or 1):
-            yield _LIGHT_SHARE
-        light = page_light(live, _receiver(live, receiver), glasses)
-        groups = _groups(live, glasses)
+        groups = _groups(traced, glasses)
         size = settings.width, settings.height
         item = light.item
-        to_plane = pixels_to_plane(stage.camera, *size, light.frame, live.buffers)
-        around = first_look(stage.camera, up_of(scene), light.frame, light.head["lit"], live.buffers)
-        weight = weight_of(context, live.buffers, stage.camera, size, item)
+        to_plane = pixels_to_plane(stage.camera, *size, light.frame, traced.buffers)
+        around = first_look(stage.camera, up_of(scene), light.frame, light.head["lit"], traced.buffers)
+        weight = weight_of(context, traced.buffers, stage.camera, size, item)
     finally:
-        engine.release()
+        traced.release()
     rgb, caustic = yield from _still(context, stage, settings)
     exposure = auto_exposure(rgb) + (settings.exposure_ev or 0.0)
     still = shown_bytes(rgb, settings.exposure_ev or 0.0, settings.glare, scene.render.antialias_highlights, ".jpg")
@@ -186,6 +180,10 @@ def page_steps(
     tables, spectra = _spectra(scene, material.reflectance)
     arrays = {**light.arrays, **picture.arrays, **shapes, **tables, **groups.arrays}
     notes = [_STAYS, _MADE.format(__version__, scene.name, scene.objects[item].name)]
+    if traced.photons < (settings.photons or 1):
+        notes.insert(
+            0, _FEWER.format(traced.photons, settings.photons, ((settings.photons or 1) / traced.photons) ** 0.5)
+        )
     if glasses.own is None and groups.head["groups"]:
         notes.insert(0, _FIRST_ORDER.format(*straight_gains(light.arrays, groups.arrays["glass_n"])))
     head = light.head | groups.head | spectra | _said(scene, item, words) | {"notes": notes}
@@ -200,18 +198,42 @@ def page_steps(
     return Page(arrays, head)
 
 
-def _receiver(live: LiveLight, name: str | None) -> int:
+def _tracing(
+    context: Context, scene: Scene, settings: RenderSettings, receiver: str | None, glasses: Glasses
+) -> Generator[float, None, tuple[TracedLight, PageLight]]:
+    """The light of as many photons as a page has room for, the caller's to release, and what it is on the receiver;
+    pausing with the share of the page that is done."""
+    photons, done = settings.photons or 1, 0.0
+    room = _ROOM * max(photons / DEFAULT_PHOTONS, 1.0)
+    settings = replace(settings, editable=True, any_view=True)
+    while True:
+        traced = TracedLight(context, scene, replace(settings, photons=photons))
+        try:
+            for share in traced.steps():
+                done = max(done, _LIGHT_SHARE * share)
+                yield done
+            light = page_light(traced, _receiver(traced, receiver), glasses)
+        except BaseException:  # also when the page is given up
+            traced.release()
+            raise
+        if (size := packed_bytes(light.arrays)) <= room:
+            return traced, light
+        traced.release()
+        photons = int(0.95 * photons * room / size)
+
+
+def _receiver(light: TracedLight, name: str | None) -> int:
     """Number of the receiver called so, or of that on which most light lands."""
-    objects = live.light_pass.scene.objects
+    objects = light.scene.objects
     numbers = [
         r
-        for r, i in enumerate(live.buffers.receivers)
+        for r, i in enumerate(light.buffers.receivers)
         if name == objects[i].name or (name is None and _why_not(objects[i]) is None)
     ]
     if not numbers:
-        whys = "; ".join(filter(None, (_why_not(objects[i]) for i in live.buffers.receivers)))
+        whys = "; ".join(filter(None, (_why_not(objects[i]) for i in light.buffers.receivers)))
         raise UserError(f"no caustic of this scene can be on a page: {whys or 'nothing in it is diffuse'}")
-    return max(numbers, key=lambda r: landed(live, r))
+    return max(numbers, key=light.landed)
 
 
 def _still(
@@ -238,10 +260,10 @@ class _Part:
     head: dict[str, Any]
 
 
-def _groups(live: LiveLight, glasses: Glasses) -> _Part:
+def _groups(light: TracedLight, glasses: Glasses) -> _Part:
     """Glasses whose dispersion may be edited, and what may be shown instead of each. None beside crystals, whose two
     indices go together, and gratings, which have none."""
-    groups, traced = live.buffers.groups, live.light_pass.scene
+    groups, traced = light.buffers.groups, light.scene
     rows: list[np.ndarray] = []
     listed: list[dict[str, Any]] = []
     edited: list[dict[str, Any]] = []
