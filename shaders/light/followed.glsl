@@ -186,7 +186,7 @@ FollowedRay follow_specular(
                         tint_by(path.walk, uint(WEIGHT_ROW) + thing.texture, -1.0);
                 }
             }
-            if (!passes && !parts_waves) unhidden *= reflect_path(path, event, geometric);
+            if (!passes && !crystal) unhidden *= reflect_path(path, event, geometric);
             for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= unhidden.y;
             leave_surface(path, hit, passes ? entering : !entering);
             lost = float(number + 1u == uint(MAX_EVENTS));
