@@ -21,7 +21,7 @@ FEW = (np.arange(40) + 0.5) / 40.0
 
 def swept_and_summed(text: str, places: np.ndarray = PLACES, side: int = 60, threshold: float = 1e-8):
     """Mean over the places of what lands by cell, as it is and times x, and of all that lands: by swept
-    polygons, and by single indices. Few
+    polygons, and by single indices, both within their hulls: edges on a receiver's border bound nothing. Few
     beams play roulette: at the ends of the spectrum, where the eye sees little, its noise is more than 1e-3."""
     rig = Rig(scene_of(text))
     emission = rig.emissions()[0]
@@ -34,7 +34,7 @@ def swept_and_summed(text: str, places: np.ndarray = PLACES, side: int = 60, thr
     for x, weights in zip(places, colour.T, strict=True):
         cell, outside, _ = cells(swept, 0, grid, x, from_hulls=True)
         one, total = one + np.multiply.outer(weights, cell), total + weights[0] * (cell.sum() + outside)
-        cell, outside, _ = cells(single, 0, grid, x)
+        cell, outside, _ = cells(single, 0, grid, x, from_hulls=True)
         other, total_summed = (
             other + np.multiply.outer(weights, cell),
             total_summed + weights[0] * (cell.sum() + outside),

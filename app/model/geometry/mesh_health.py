@@ -109,11 +109,11 @@ def seam_map(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, n
     edges, uses = _edges(number[triangles])
     border = np.unique(edges[:, uses == 1])
     if len(border):
-        from scipy.spatial import cKDTree
-
-        reach = _SEAM * float(np.ptp(vertices, axis=0).max())
-        near = border[cKDTree(vertices[kept][border]).query_pairs(reach, output_type="ndarray")]
-        used, place = np.unique(connected_roots(near[:, 0], near[:, 1], len(kept)), return_inverse=True)
+        # Places nearer than half a cell share one, in the grid or in one that is shifted by halves.
+        cells = vertices[kept][border] / (2.0 * _SEAM * float(np.ptp(vertices, axis=0).max()) or 1.0)
+        grids = [weld_map(np.floor(cells + 0.5 * np.array(shift))) for shift in np.ndindex(2, 2, 2)]
+        first = np.concatenate([border[alone[group]] for alone, group in grids])
+        used, place = np.unique(connected_roots(np.tile(border, 8), first, len(kept)), return_inverse=True)
         kept, number = kept[used], place[number]
     return kept, number
 
