@@ -75,17 +75,9 @@ class Search:
     """Leaves of one facet that the source sees: with more, a search is given up."""
 
 
-@dataclass(frozen=True)
-class _Begun:
-    """A source's beams, ready to be followed from the facets that it sees."""
-
-    args: tuple[np.ndarray, ...]
-    jobs: list[tuple[np.ndarray, np.ndarray]]
-    """NODE (1,) and WORK (1,) each."""
-    sums: np.ndarray
-    blocked: set[int]
-
-
+_Args = tuple[np.ndarray, ...]
+_Job = tuple[np.ndarray, np.ndarray]
+"""NODE (1,) and WORK (1,)."""
 Found = tuple[list[Leaves], np.ndarray, set[int]]
 
 
@@ -101,8 +93,8 @@ def search(
     order."""
     begun = [_begin(scene, emission, how) for emission, how in sources]
 
-    def one(job: tuple[tuple[np.ndarray, ...], int, np.ndarray, np.ndarray]) -> Leaves:
-        args, most, root, work = job
+    def one(job: tuple[_Args, int, _Job]) -> Leaves:
+        args, most, (root, work) = job
         store = Store()
         stack = take_stack()
         stack[FIRST : FIRST + 1] = root
@@ -118,11 +110,7 @@ def search(
         return store.leaves(work["count"][0])
 
     # Threads have little to do in Python, where they would wait for each other.
-    jobs = [
-        (each.args, how.most, root, work)
-        for each, (_, how) in zip(begun, sources, strict=True)
-        for root, work in each.jobs
-    ]
+    jobs = [(args, how.most, job) for (args, own, *_), (_, how) in zip(begun, sources, strict=True) for job in own]
     if len(jobs) < 2:
         done = [one(job) for job in jobs]
     else:
@@ -130,15 +118,15 @@ def search(
 
         with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
             done = list(pool.map(one, jobs))
-    found, first = list[Found](), 0
-    for each in begun:
-        leaves = done[first : first + len(each.jobs)]
-        first += len(leaves)
-        found.append((leaves, each.sums + sum(work["sums"][0] for _, work in each.jobs), each.blocked))
-    return found
+    leaves = iter(done)
+    return [
+        ([next(leaves) for _ in own], sums + sum(work["sums"][0] for _, work in own), blocked)
+        for _, own, sums, blocked in begun
+    ]
 
 
-def _begin(scene: BeamScene, emission: Emission, how: Search) -> _Begun:
+def _begin(scene: BeamScene, emission: Emission, how: Search) -> tuple[_Args, list[_Job], np.ndarray, set[int]]:
+    """What is followed from the facets that a source sees, with `sums` and objects as `search` returns them."""
     sums = np.zeros(SUMS)
     tables = np.vstack([scene.tables, emission.power, emission.watts])
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
@@ -171,12 +159,12 @@ def _begin(scene: BeamScene, emission: Emission, how: Search) -> _Begun:
     sums[SUM_ENTERED] = sum(flux_in(root, 0, tables, work) for root, work in jobs)
     entered = sum(power_of(root, 0, tables, work) for root, work in jobs)
     if not jobs or entered <= 0.0:
-        return _Begun(args, [], sums, blocked)
+        return args, [], sums, blocked
     relative = entered if how.power is None else math.sqrt(entered * how.power)
     for _, work in jobs:
         work["threshold"] = threshold = _rounded(how.threshold * relative)
         work["faint"] = how.faint / how.threshold * threshold
-    return _Begun(args, jobs, sums, blocked)
+    return args, jobs, sums, blocked
 
 
 def _rounded(threshold: float) -> float:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 def inspect(options: Inspect) -> int:
     """Show a scene, or its programs. Raises `UserError`."""
+    from ..model.flat_faces import with_flat_faces
     from ..model.io.scene_file import load_scene
     from ..model.panorama_lights import with_panorama_lights
 
@@ -32,7 +33,7 @@ def inspect(options: Inspect) -> int:
     if options.programs:
         from .inspect_programs import programs_text
 
-        show(programs_text(scene))
+        show(programs_text(with_flat_faces(scene)))
     else:
         show(inspect_text(scene))
     return 0
@@ -141,13 +142,15 @@ def _lights_table(lights: tuple[Light, ...]) -> Table:
 def _compiled(scene: Scene) -> list[RenderableType]:
     from ..features.facts import Facts
     from ..features.features import Features
+    from ..model.flat_faces import with_flat_faces
     from ..model.settings import RenderSettings
     from .inspect_camera import lookups
     from .inspect_features import record_words, static_costs
 
     wishes = scene.render
     settings = RenderSettings(width=wishes.width, height=wishes.height, max_depth=wishes.max_depth)
-    features, facts = Features.of(scene, settings), Facts(scene, settings)
+    rendered = with_flat_faces(scene)
+    features, facts = Features.of(rendered, settings), Facts(rendered, settings)
     costs = static_costs(facts, features)
     rows = [
         (name, "in" if included else "out", reason, costs.get(name, ""))

@@ -328,7 +328,7 @@ class Named(Protocol):
 
 def names(items: Iterable[Named]) -> str:
     """For people."""
-    return listed([item.name for item in items])
+    return listed(list(dict.fromkeys(item.name for item in items)))
 
 
 def listed(words: list[str]) -> str:

@@ -306,7 +306,7 @@ class SceneBuffers:
                 record["weight_row"] = len(weights)
                 weights.append(mirror_reflectance(material.reflectance_rgb, nm))
             if material.dispersion is None and (self.features.environment_lights or self.features.bounces):
-                record["medium"] = 0 if item.mesh.is_closed else NONE
+                record["medium"] = 0 if item.whole.mesh.is_closed else NONE
             if isinstance(material, Grating):
                 record["weight_row"] = sum(len(texels) for texels in gratings)
                 gratings.append(grating_texels(item, self.grating_rows.get(index)))

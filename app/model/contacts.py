@@ -37,7 +37,7 @@ def overlapping_solids(scene: Scene) -> list[int]:
 
 def contacts(scene: Scene) -> list[tuple[int, int]]:
     """Pairs of objects, at least one of them not glass, whose surfaces may touch: some triangle's bounds meet the
-    other's bounds, both ways (of glass, which has an inside, one way)."""
+    other's bounds, both ways (of glass, which has an inside, one way). Faces of one object (`flat_faces`) are none."""
     objects = scene.objects
     if not objects:
         return []
@@ -57,20 +57,18 @@ def contacts(scene: Scene) -> list[tuple[int, int]]:
         (int(i), int(j))
         for pairs in _meeting(bounds, slack)
         for i, j in pairs[~glass[pairs].all(axis=1)]
-        if reaches(i, j) and reaches(j, i)
+        if objects[i].name != objects[j].name and reaches(i, j) and reaches(j, i)
     )
 
 
 def standing(scene: Scene) -> list[tuple[int, int]]:
     """Pairs of a diffuse object and another one that stands on it, or is sunk into it, by their bounds."""
     receivers = [i for i, item in enumerate(scene.objects) if item.material.receives]
-    bounds = [world_bounds(item) for item in scene.objects] if receivers else []
-    return [
-        (i, j)
-        for i in receivers
-        for j, other in enumerate(bounds)
-        if i != j and _meet(bounds[i], other, _STANDING_SLACK * float(np.ptp(other, axis=0).max()))
-    ]
+    if not receivers:
+        return []
+    bounds = np.stack([world_bounds(item) for item in scene.objects], axis=1)
+    slack = _STANDING_SLACK * np.ptp(bounds, axis=0).max(axis=1, keepdims=True)
+    return [(i, int(j)) for i in receivers for j in np.flatnonzero(_meet(bounds[:, i], bounds, slack)) if i != j]
 
 
 def nested_pairs(scene: Scene) -> list[tuple[int, int]]:

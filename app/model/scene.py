@@ -8,7 +8,7 @@ packs it. Lengths are in the scene's own unit, angles in names say their unit.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -89,6 +89,11 @@ class SceneObject:
     """float64 (4, 4), column vectors: p_world = M @ p_object."""
     local_dispersion: tuple[Dab, ...] = ()
     """Touches of the dispersion brush on this receiver, oldest first."""
+
+    @property
+    def whole(self) -> SceneObject:
+        """The object that this is a flat face of (`flat_faces`), or itself."""
+        return self if self.mesh.whole is None else replace(self, mesh=self.mesh.whole)
 
     @property
     def world_vertices(self) -> np.ndarray:

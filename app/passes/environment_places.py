@@ -18,6 +18,7 @@ from ..gpu.schema import Field, Struct
 from ..gpu.tiles import pack
 from ..model.contacts import world_bounds
 from ..model.geometry.charts import DEFAULT_GUTTER, ChartAtlas, build_charts
+from ..model.scene import SceneObject
 from ..model.scene_checks import contains
 from .map_layout import Window
 from .plane_frame import PlaneFrame, plane_frame
@@ -176,18 +177,19 @@ def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = 
     # Faces of one object (`model.flat_faces`), which have its name, share its texels.
     areas = [float(mesh.areas().sum()) for mesh in buffers.world_meshes]
     names = [item.name for item in scene.objects]
+    is_solid = {names[i]: _is_solid(buffers, scene.objects[i].whole) for i in {names[i]: i for i in receivers}.values()}
     of_name = {name: sum(areas[i] for i in receivers if names[i] == name) for name in set(names)}
     share = finer * min(1.0, MOST_TEXELS / (max(len({names[i] for i in receivers}), 1) * (FINE_TEXELS + COARSE_TEXELS)))
     for receiver, index in enumerate(receivers):
         item, mesh = scene.objects[index], buffers.world_meshes[index]
+        sides = (False,) if is_solid[item.name] else (False, True)
         if not item.mesh.is_flat:
             atlas = build_charts(mesh, total_texels=max(256, int(share * CHART_TEXELS)), gutter=gutter)
-            sides = (False,) if mesh.is_closed and not _holds_anything(buffers, index) else (False, True)
             tiles += [_Side(receiver, (atlas.width, atlas.height), back=back, atlas=atlas) for back in sides]
             continue
         frame = plane_frame(buffers.space.to_gpu(mesh.vertices))
         windows = _windows(buffers, index, frame)
-        for back in (False, True):
+        for back in sides:
             for number, window in enumerate(windows):
                 texels = COARSE_TEXELS if number + 1 == len(windows) else BETWEEN_TEXELS
                 texels = FINE_TEXELS if number == 0 else texels
@@ -201,15 +203,16 @@ def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = 
     return _packed(buffers, tiles, placed, (width, size[1]))
 
 
-def _holds_anything(buffers: SceneBuffers, index: int) -> bool:
-    """Whether a closed receiver is a room whose walls light each other: a lamp, the camera or another thing is in
-    it."""
-    scene = buffers.scene
-    if not buffers.features.bounces:
-        return False
+def _is_solid(buffers: SceneBuffers, item: SceneObject) -> bool:
+    """Whether nobody sees the inside of a receiver: it is closed, and no room whose walls light each other, with a
+    lamp, the camera or another thing in it."""
+    scene, is_closed = buffers.scene, item.mesh.is_closed and not item.mesh.is_flat
+    if not (is_closed and buffers.features.bounces):
+        return is_closed
     within = [np.array(light.position) for light in scene.lights] + [np.array(scene.camera.position)]
-    within += [world_bounds(o).mean(axis=0) for i, o in enumerate(scene.objects) if i != index]
-    return any(contains(scene.objects[index], point) for point in within)
+    others = {other.name: other.whole for other in scene.objects if other.name != item.name}
+    within += [world_bounds(other).mean(axis=0) for other in others.values()]
+    return not any(contains(item, point) for point in within)
 
 
 def _windows(buffers: SceneBuffers, index: int, frame: PlaneFrame) -> list[Window]:

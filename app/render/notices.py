@@ -106,14 +106,17 @@ def light_notices(light: LightPass) -> list[str]:
         found.append(f"{100.0 * outside / drawn:.1f} % of the caustics misses all maps and the picture")
     if light.map_receiver is not None:  # its texels are the picture's
         return found
+    pixels: dict[str, float] = {}
     for receiver, windows in light.layout.windows.items():
-        pixels = [_window_pixels(light, receiver, window) for window in windows]
-        if receiver in light.survey.lit_receivers and pixels and max(pixels) < 1.0:
-            item = light.scene.objects[light.buffers.receivers[receiver]]
-            found.append(
-                f"the caustic map of '{item.name}' is smaller than a pixel; choose a larger --size or come nearer"
-            )
-    return found
+        if receiver in light.survey.lit_receivers and windows:
+            name = light.scene.objects[light.buffers.receivers[receiver]].name
+            largest = max(_window_pixels(light, receiver, window) for window in windows)
+            pixels[name] = max(largest, pixels.get(name, 0.0))  # of all faces of one object
+    return found + [
+        f"the caustic map of '{name}' is smaller than a pixel; choose a larger --size or come nearer"
+        for name, largest in pixels.items()
+        if largest < 1.0
+    ]
 
 
 def _window_pixels(light: LightPass, receiver: int, window: Window | PictureWindow) -> float:

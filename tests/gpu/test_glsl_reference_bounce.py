@@ -7,6 +7,7 @@ import numpy as np
 from spectrasplat.gpu import bindings
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.model.environment import constant
+from spectrasplat.model.flat_faces import with_flat_faces
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.scene import Black, Camera, Diffuse, RenderDefaults, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
@@ -100,19 +101,21 @@ def test_light_is_looked_up_between_the_texels_of_either_side(gl) -> None:
 
 
 def test_what_is_covered_hangs_near_or_holds_the_place(gl) -> None:
-    """A disc near a floor, one far above, a ball sunk into it to a third; and the parts of texels that say so."""
+    """A disc near a floor, one far above, a ball sunk into it to a third, a post of faces of its own; and the parts of
+    texels that say so."""
     things = (
         ("near", primitives.disc(0.4), (-1.0, 0.0, 0.003), Black()),
         ("far", primitives.disc(0.4), (0.0, 0.0, 0.6), Black()),
         ("sunk", primitives.sphere(0.5, 20000), (1.0, 0.0, 0.25), Diffuse()),
         ("floor", primitives.plane(4.0, 2.0), (0.0, 0.0, 0.0), Diffuse()),
+        ("post", primitives.box((0.3, 0.4, 0.9)), (0.0, -0.6, 0.1), Diffuse()),
     )
     items = [
         SceneObject(n, m, material, np.block([[np.eye(3), np.reshape(at, (3, 1))], [0, 0, 0, 1]]))
         for n, m, at, material in things
     ]
     camera = Camera((0.0, -4.0, 2.0), (0.0, 0.0, 0.0))
-    scene = Scene("covers", camera, (), tuple(items), environment=constant((1.0, 1.0, 1.0)))
+    scene = with_flat_faces(Scene("covers", camera, (), tuple(items), environment=constant((1.0, 1.0, 1.0))))
     buffers = scene_buffers(gl, scene, RenderSettings())
     places = environment_places(buffers)
     both = covered_places(buffers, places)
@@ -137,7 +140,8 @@ def test_what_is_covered_hangs_near_or_holds_the_place(gl) -> None:
         texture.release()
         buffers.release()
     middles, radii = np.array([[-1.0, 0.0], [1.0, 0.0]]), np.array([0.4, np.sqrt(0.5**2 - 0.2**2)])
-    beyond = np.linalg.norm(xy[:, None] - middles, axis=2) - radii
+    post = (np.abs(xy - [0.0, -0.6]) - [0.15, 0.2]).max(axis=1)
+    beyond = np.c_[np.linalg.norm(xy[:, None] - middles, axis=2) - radii, post]
     clear = np.abs(beyond).min(axis=1) > 0.005
     np.testing.assert_array_equal(found[clear], (beyond < 0.0).any(axis=1)[clear])
     assert len(both.places) > len(places.places)

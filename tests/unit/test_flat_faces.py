@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from spectrasplat.model.flat_faces import faces_of, with_flat_faces
+from spectrasplat.model.flat_faces import with_flat_faces
 from spectrasplat.model.geometry.mesh import make_mesh
 from spectrasplat.model.geometry.primitives import box, prism, sphere
 from spectrasplat.model.materials import Dielectric, Diffuse
@@ -16,13 +16,13 @@ pytestmark = pytest.mark.core
 
 def test_faces_make_up_their_object() -> None:
     whole = box((1.0, 2.0, 3.0))
-    faces = faces_of(whole)
+    faces = whole.flat_faces
     assert len(faces) == 6 and all(face.is_flat for face in faces)
     assert sum(face.areas().sum() for face in faces) == pytest.approx(22.0)
     corners = np.concatenate([face.corners() for face in faces]).reshape(-1, 9)
     assert sorted(map(tuple, corners)) == sorted(map(tuple, whole.corners().reshape(-1, 9)))
     # The same mesh has the same faces: what an edit does not touch is recognised by them.
-    assert faces_of(whole) is faces
+    assert whole.flat_faces is faces and all(face.whole is whole for face in faces)
 
 
 def test_planes_far_apart_and_slivers() -> None:
@@ -32,7 +32,7 @@ def test_planes_far_apart_and_slivers() -> None:
     quads = np.array([[0, 1, 2], [0, 2, 3]])
     sliver = [[0, 1, 1 + 8]]
     triangles = np.concatenate([quads, quads + 4, quads + 8, sliver])
-    faces = faces_of(make_mesh("stair", stair, triangles))
+    faces = make_mesh("stair", stair, triangles).flat_faces
     assert sorted(face.areas().sum() for face in faces) == pytest.approx([1.0, 2.0])
     assert sum(len(face.triangles) for face in faces) == 7
 
@@ -46,7 +46,7 @@ def test_who_is_taken_apart() -> None:
     }
     scene = Scene("s", Camera((0, 0, 9), (0, 0, 0)), (), tuple(items.values()))
     found = with_flat_faces(scene)
-    assert [item.name for item in found.objects] == ["table", "glass", "stone", *["table"] * 5]
-    assert found.objects[1] is items["glass"] and found.objects[2] is items["stone"]
+    assert [item.name for item in found.objects] == [*["table"] * 6, "glass", "stone"]
+    assert found.objects[6] is items["glass"] and found.objects[7] is items["stone"]
     alone = Scene("s", scene.camera, (), (items["glass"], items["stone"]))
     assert with_flat_faces(alone) is alone

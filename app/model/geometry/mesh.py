@@ -11,9 +11,10 @@ A mesh that was edited is another value, has no recipe (`replace` leaves it out)
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from ...base.errors import UserError
 
 MAX_CONVEX_PLANES = 96
 """Enough for a brilliant with a faceted girdle (73)."""
+MAX_FLAT_FACES = 12
+"""Of an object: each has maps of its own, however few pixels see it."""
 # Files hold float32 coordinates (1.2e-7 relative); a plane through them is known to a few times that.
 _COPLANAR_TOLERANCE = 2e-6
 _COPLANAR_COSINE = 0.9999
@@ -45,6 +48,8 @@ class Mesh:
     uv_unwraps: bool = True
     """Whether `uv` may lay out the charts of a caustic map; not where it was made for pictures and stretches or
     repeats."""
+    whole: Mesh | None = field(default=None, repr=False)
+    """The mesh that this is a flat face of."""
     recipe: Mapping[str, Any] | None = field(default=None, init=False, repr=False)
     """The scene-file keys that make exactly this mesh: `shape` with its sizes, or `mesh` (absolute path) with
     `smooth`; None where no words do."""
@@ -76,6 +81,24 @@ class Mesh:
         low, high = used.min(axis=0), used.max(axis=0)
         low.flags.writeable = high.flags.writeable = False
         return low, high
+
+    @cached_property
+    def flat_faces(self) -> tuple[Mesh, ...]:
+        """Its flat faces, the largest first; none where it is one, has more than `MAX_FLAT_FACES`, or is shaded as
+        curved ones are."""
+        planes = [] if self.is_flat or not self.is_faceted else list(islice(_coplanar(self), MAX_FLAT_FACES + 1))
+        return tuple(map(self._face, planes)) if 1 < len(planes) <= MAX_FLAT_FACES else ()
+
+    def _face(self, rows: np.ndarray) -> Mesh:
+        used, corners = np.unique(self.triangles[np.sort(rows)], return_inverse=True)
+        return replace(
+            self,
+            vertices=self.vertices[used],
+            triangles=corners.reshape(-1, 3).astype(np.int32),
+            corner_normals=None,
+            uv=None if self.uv is None else self.uv[np.sort(rows)],
+            whole=self,
+        )
 
     def volume(self) -> float:
         """Signed volume, cubic units; positive when a closed mesh faces outward (divergence theorem)."""
@@ -244,40 +267,24 @@ def _frozen(array: np.ndarray) -> np.ndarray:
 
 def convex_planes_of(mesh: Mesh, most: int = MAX_CONVEX_PLANES) -> np.ndarray | None:
     """As `Mesh.convex_planes`, up to `most` of them."""
-    area_vectors = mesh.area_vectors()
-    areas = np.linalg.norm(area_vectors, axis=1)
-    normals = normalised(area_vectors)
-    corners = mesh.corners()
-    tolerance = _COPLANAR_TOLERANCE * float(np.linalg.norm(np.subtract(*mesh.bounds())))
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    solid = areas > 0.5 * tolerance * longest  # a sliver knows no plane, and those of its neighbours bound it
+    area_vectors, areas, slivers = mesh.area_vectors(), mesh.areas(), _slivers(mesh)
     if mesh.corner_normals is not None:
-        cosines = np.einsum("tcj,tj->tc", mesh.corner_normals, normals)
-        if (cosines[solid] < 1.0 - 1e-9).any():
+        cosines = np.einsum("tcj,tj->tc", mesh.corner_normals, normalised(area_vectors))
+        if (cosines[~slivers] < 1.0 - 1e-9).any():
             return None
     if not mesh.is_closed or mesh.volume() <= 0.0:
         return None
     middle = 0.5 * np.add(*mesh.bounds())
-    corners = corners - middle
+    corners = mesh.corners() - middle
     centroids = corners.mean(axis=1)
-
     planes: list[np.ndarray] = []
-    left = np.flatnonzero(solid)
-    left = left[np.argsort(-areas[left], kind="stable")]  # the largest triangle knows its plane best
-    while len(left):
-        if len(planes) == most:
-            return None
-        normal, offset = normals[left[0]], normals[left[0]] @ centroids[left[0]]
-        beyond = np.abs(corners[left] @ normal - offset).max(axis=1)
-        together = (beyond <= tolerance) & (normals[left] @ normal >= _COPLANAR_COSINE)
-        together[0] = True
-        members = left[together]
-        normal = normalised(area_vectors[members].sum(axis=0))
-        offset = np.average(centroids[members] @ normal, weights=areas[members])
-        if (corners @ normal).max() > offset + tolerance:
+    for members in _coplanar(mesh):
+        known = members[~slivers[members]]
+        normal = normalised(area_vectors[known].sum(axis=0))
+        offset = np.average(centroids[known] @ normal, weights=areas[known])
+        if len(planes) == most or (corners @ normal).max() > offset + _coplanar_tolerance(mesh):
             return None
         planes.append(np.append(normal, offset + normal @ middle))
-        left = left[~together]
     # A surface covering the hull twice (two coincident shells) would pass all of the above.
     used = mesh.vertices[np.unique(mesh.triangles)]
     if len(np.unique(used, axis=0)) != len(used):
@@ -285,25 +292,32 @@ def convex_planes_of(mesh: Mesh, most: int = MAX_CONVEX_PLANES) -> np.ndarray | 
     return _frozen(np.array(planes))
 
 
-def coplanar(mesh: Mesh, most: int) -> list[np.ndarray] | None:
-    """Triangles by the plane that they lie in and face, the largest first; None where there are more than `most`
-    planes. Slivers that lie in none of them are left out."""
-    areas, normals, corners = mesh.areas(), mesh.face_normals(), mesh.corners()
-    corners = corners - 0.5 * np.add(*mesh.bounds())
-    tolerance = _COPLANAR_TOLERANCE * float(np.linalg.norm(np.subtract(*mesh.bounds())))
+def _coplanar_tolerance(mesh: Mesh) -> float:
+    return _COPLANAR_TOLERANCE * float(np.linalg.norm(np.subtract(*mesh.bounds())))
+
+
+def _slivers(mesh: Mesh) -> np.ndarray:
+    """bool (T,): triangles that know no plane; their neighbours' planes bound them."""
+    corners = mesh.corners()
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    is_sliver = areas <= 0.5 * tolerance * longest
-    found, left = list[np.ndarray](), np.argsort(-areas, kind="stable")
-    while not is_sliver[left].all():
-        first = left[~is_sliver[left]][0]
+    return mesh.areas() <= 0.5 * _coplanar_tolerance(mesh) * longest
+
+
+def _coplanar(mesh: Mesh) -> Iterator[np.ndarray]:
+    """Triangles by the plane that they lie in and face, that of the largest first, for it knows its plane best. Slivers
+    go with the first plane that holds them, and are left out where none does."""
+    normals, slivers = mesh.face_normals(), _slivers(mesh)
+    corners = mesh.corners() - 0.5 * np.add(*mesh.bounds())
+    left = np.argsort(-mesh.areas(), kind="stable")
+    while len(known := left[~slivers[left]]):
+        first = known[0]
         beyond = np.abs((corners[left] - corners[first].mean(axis=0)) @ normals[first]).max(axis=1)
-        together = (beyond <= tolerance) & (is_sliver[left] | (normals[left] @ normals[first] >= _COPLANAR_COSINE))
-        together[left == first] = True
-        if len(found) == most:
-            return None
-        found.append(np.sort(left[together]))
+        together = (beyond <= _coplanar_tolerance(mesh)) & (
+            slivers[left] | (normals[left] @ normals[first] >= _COPLANAR_COSINE)
+        )
+        together |= left == first
+        yield left[together]
         left = left[~together]
-    return found
 
 
 def note_recipe(mesh: Mesh, recipe: Mapping[str, Any]) -> None:
