@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import os
 import time
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -18,6 +18,7 @@ from ..base.errors import UserError
 from ..base.generators import finished
 from ..base.image_io import save_codes
 from ..commands.solving_table import GRADIENT_SIZE
+from ..model.io.scene_pictures import png_bytes
 from .arguments import Count, Size, settings_of
 from .device import Cancel, Device, Progress
 from .picture import Floats
@@ -49,7 +50,7 @@ class Gradient:
     step: float
     """Change of the parameter to either side by which it was found."""
     noise: float
-    """Standard deviation of `rgb` by chance, over its norm: of single texels; means over several are less noisy."""
+    """Error of `rgb` by chance and blur, over its norm: of single texels; means over several have less."""
     placement: Mapping[str, object] | None
     """Where a map lies, see `CausticMap.placement`."""
     seconds: float
@@ -70,11 +71,7 @@ class Gradient:
 
     def _repr_png_(self) -> bytes:
         """As notebooks show it."""
-        from PIL import Image
-
-        file = io.BytesIO()
-        Image.fromarray(self.codes).save(file, "PNG")
-        return file.getvalue()
+        return png_bytes(self.codes)
 
     def __repr__(self) -> str:
         height, width, _ = self.rgb.shape
@@ -82,15 +79,21 @@ class Gradient:
         return f"Gradient('{self.of}', {width}×{height}, {found}, {self.seconds:.1f} s)"
 
 
-def solved(steps: Generator[float, None, T], report: Callable[[float, str], None], stopped: Callable[[], bool]) -> T:
-    """What `steps` return. Raises `UserError` where they were stopped."""
+def solved(
+    begin: Callable[[Context], Generator[float, None, T]], progress: Progress | None, cancel: Cancel | None
+) -> T:
+    """What the steps that `begin` returns find. Raises `UserError` where they were stopped."""
 
-    def paused(share: float) -> None:
-        report(share, "solving")
-        if stopped():
-            raise UserError("it was stopped before there was an answer: let it go on for longer")
+    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> T:
+        def paused(share: float) -> None:
+            report(share, "solving")
+            if stopped():
+                raise UserError("it was stopped before there was an answer: let it go on for longer")
 
-    return finished(steps, paused)
+        return finished(begin(context), paused)
+
+    with Device() as device:
+        return device.run(work, progress, cancel)
 
 
 def gradients(
@@ -116,35 +119,19 @@ def gradients(
         raise UserError("of must be a list of paths, such as ['objects.prism.n_d']")
     if step is not None and not (isinstance(step, int | float) and 0.0 < step < float("inf")):
         raise UserError(f"step {step!r} is no change of a parameter: give a number above 0")
-    model, started = scene._model, time.perf_counter()
+    from ..edit.parameters import Stage
+    from ..render.gradient import gradient
 
-    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> list[Gradient]:
-        from ..edit.parameters import Stage
-        from ..render.gradient import gradient
-
-        given = dict.fromkeys(of, float(step)) if step is not None else None
-        found = solved(
-            gradient(context, Stage(model, model.camera), settings, list(of), given, noise=True), report, stopped
+    stage, started = Stage(scene._model, scene._model.camera), time.perf_counter()
+    given = dict.fromkeys(of, float(step)) if step is not None else None
+    found = solved(lambda context: gradient(context, stage, settings, list(of), given, noise=True), progress, cancel)
+    base, seconds = (found.base.rgb, found.base.spectral, found.base.bin_edges_nm), time.perf_counter() - started
+    return [
+        Gradient(
+            each.path, each.picture.rgb, each.picture.spectral, *base, each.step, each.noise, found.placement, seconds
         )
-        base, seconds = found.base, time.perf_counter() - started
-        return [
-            Gradient(
-                each.path,
-                each.picture.rgb,
-                each.picture.spectral,
-                base.rgb,
-                base.spectral,
-                base.bin_edges_nm,
-                each.step,
-                each.noise,
-                found.placement,
-                seconds,
-            )
-            for each in found.derivatives
-        ]
-
-    with Device() as device:
-        return device.run(work, progress, cancel)
+        for each in found.derivatives
+    ]
 
 
 def gradient(
@@ -168,16 +155,5 @@ def gradient(
     in that bin. `step`: change of the parameter to either side; found where it is not given. Raises `UserError`, also
     where `cancel` stopped it.
     """
-    return gradients(
-        scene,
-        [of],
-        receiver,
-        size=size,
-        photons=photons,
-        seed=seed,
-        bins=bins,
-        spp=spp,
-        step=step,
-        progress=progress,
-        cancel=cancel,
-    )[0]
+    found = partial(gradients, scene, [of], receiver, size=size, photons=photons, seed=seed, bins=bins, spp=spp)
+    return found(step=step, progress=progress, cancel=cancel)[0]

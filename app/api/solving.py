@@ -13,13 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.errors import UserError
 from ..edit.solved import Fit, Match, Ranked
 from .arguments import Count, check_scene, settings_of
-from .device import Cancel, Device, Progress
+from .device import Cancel, Progress
 from .gradient import solved
 from .rendering import check_receiver
 from .scene import Scene
 
 if TYPE_CHECKING:
-    from ..gpu.context import Context
     from ..render.solving import Solver
 
 __all__ = ["Fit", "Match", "Ranked", "fit", "match"]
@@ -98,19 +97,11 @@ def _run(
     settings = settings_of(scene, photons=photons, seed=seed)
     check_receiver(scene, receiver)
     values = None if target is None else _values(target)
-    model = scene._model
+    from ..edit.parameters import Stage
+    from ..render.solving import solution
 
-    def run(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> T:
-        from ..edit.parameters import Stage
-        from ..gpu.shader import keep_programs
-        from ..render.solving import solution
-
-        keep_programs(context.ctx)
-        stage = Stage(model, model.camera)
-        return solved(solution(context, stage, settings, receiver, values, between, width, work), report, stopped)
-
-    with Device() as device:
-        return device.run(run, progress, cancel)
+    wish = Stage(scene._model, scene._model.camera), settings, receiver, values, between, width
+    return solved(lambda context: solution(context, *wish, work), progress, cancel)
 
 
 def _values(target: ArrayLike | str | os.PathLike[str]) -> NDArray[np.float64]:

@@ -30,6 +30,11 @@ def mapped(steps: Generator[P, Any, T], change: Callable[[P], Q]) -> Generator[Q
         yield change(pause)
 
 
+def part_of(steps: Generator[float, Any, T], begun: float, share: float) -> Generator[float, None, T]:
+    """`steps`, whose shares done are of `share` of something larger, `begun` of which was done before."""
+    return mapped(steps, lambda done: begun + share * done)
+
+
 def timed(steps: Generator[P, Any, T], count: Callable[[float], object]) -> Generator[P, None, T]:
     """`steps`; `count` gets the seconds that they work from one pause to the next."""
     while True:

@@ -15,6 +15,7 @@ from .printing import note, show
 from .solving_table import GRADIENT_SIZE, Fit, Gradient, Match, Wanted
 
 if TYPE_CHECKING:
+    from ..edit.solved import Rows
     from ..gpu.context import Context
     from ..model.scene import Scene
     from ..render.solving import Solver
@@ -74,16 +75,7 @@ def match(options: Match) -> int:
     found = _solved(options, scene, options.receiver, "comparing glasses", lambda its: its.match(index, count))
     if found is None:
         return INTERRUPTED
-    show(f"{'glass':<28} {'n_d':>9} {'V_d':>7}  differs by")
-    for each in found.glasses:
-        show(f"{each.name:<28} {each.n_d:9.5f} {each.V_d:7.2f}  {100.0 * each.error:.3g} %")
-    (n_d, v_d), (n_d_sd, v_d_sd) = found.fit.values.values(), found.fit.deviations.values()
-    if options.width is None:
-        show(f"without a name: n_d {n_d:.6f} ± {n_d_sd:.1g}, V_d {v_d:.3f} ± {v_d_sd:.1g}")
-    else:
-        show(f"without a name: V_d {v_d:.3f} at n_d {n_d:.5f}; glasses of quite another n_d were not compared")
-    show(f"in {time.perf_counter() - started:.1f} s")
-    return 0
+    return _told(found.rows(), started)
 
 
 def fit(options: Fit) -> int:
@@ -95,11 +87,13 @@ def fit(options: Fit) -> int:
     found = _solved(options, scene, options.receiver, "fitting", lambda its: its.fit(options.of))
     if found is None:
         return INTERRUPTED
-    for path, value in found.values.items():
-        deviation = "" if options.width is not None else f" ± {found.deviations[path]:.1g}"
-        show(f"{path} {value:.6g}{deviation}")
-    took = time.perf_counter() - started
-    show(f"what is left differs by {100.0 * found.error:.3g} %; {found.steps} steps in {took:.1f} s")
+    return _told(found.rows(), started)
+
+
+def _told(rows: Rows, started: float) -> int:
+    for label, text in rows:
+        show(f"{label:<28} {text}")
+    show(f"in {time.perf_counter() - started:.1f} s")
     return 0
 
 
@@ -108,7 +102,6 @@ def _solved(
 ) -> T | None:
     """What `work` finds for the target of `options`; None where it was interrupted. Raises `UserError`."""
     from ..edit.parameters import Stage
-    from ..gpu.shader import keep_programs
     from ..render import light_target
     from ..render.bake import check_receiver
     from ..render.solving import solution
@@ -120,14 +113,8 @@ def _solved(
         raise UserError("--begin and --end go together: give both, where the target's first row begins and ends")
     values = None if options.target is None else light_target.read_target(options.target)
     note_assumptions(scene)
-    settings = settings_for(options, scene)
-
-    def steps(context: Context) -> Generator[float, None, T]:
-        keep_programs(context.ctx)
-        wish = receiver, values, between or None, options.width
-        return (yield from solution(context, Stage(scene, scene.camera), settings, *wish, work))
-
-    return _run(scene, what, steps)
+    wish = Stage(scene, scene.camera), settings_for(options, scene), receiver, values, between or None, options.width
+    return _run(scene, what, lambda context: solution(context, *wish, work))
 
 
 def _run(scene: Scene, what: str, steps: Callable[[Context], Generator[float, None, T]]) -> T | None:

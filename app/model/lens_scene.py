@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import UserError, suggestion
+from ..base.errors import UserError
 from .geometry.primitives_lens import vertices_of
 from .lights.light import DEFAULT_ILLUMINANCE
 from .lights.outlined import CollimatedLight
-from .naming import Names, listed
+from .naming import Names, place_of
 from .optics.lens_design import Lens, Surface, lens_table
 from .optics.spectrum import illuminant
 from .scene import Camera, Dielectric, Diffuse, Scene, SceneObject
@@ -140,13 +140,10 @@ def lens_in(scene: Scene, name: str | None = None) -> Lens:
     Where lenses are stretched across their axis, it is the section in which they are curved most. Raises `UserError`
     where there is none, or where its glasses overlap.
     """
-    lenses = [item for item in scene.objects if _sizes(item)]
-    chosen = next((item for item in lenses if item.name == name), None) if name else next(iter(lenses), None)
-    if chosen is None:
-        names = [item.name for item in lenses]
-        has = f"{suggestion(name or '', names) or ';'} it has {listed(names)}" if lenses else ""
-        which = f" called '{name}'" if name else ""
-        raise UserError(f"scene '{scene.name}' has no glass of shape \"lens\"{which}{has or '; add one'}")
+    lenses, without = [item for item in scene.objects if _sizes(item)], f"scene '{scene.name}' has no glass of shape"
+    if not lenses:
+        raise UserError(f'{without} "lens"; add one')
+    chosen = lenses[place_of(name, [item.name for item in lenses], f'{without} "lens" called') if name else 0]
     frame = chosen.object_to_world[:3, :3] / np.linalg.norm(chosen.object_to_world[:3, :3], axis=0)
     axis, origin = frame[:, 2], chosen.object_to_world[:3, 3]
     near = _TOLERANCE * float(_sizes(chosen)["diameter"] * np.linalg.norm(chosen.object_to_world[:3, :3]))

@@ -168,30 +168,15 @@ def check_plate(
     for i, (most, fails) in enumerate(wanted):
         report(0.6 + 0.13 * i, "tilting and moving it")
         tolerances.append(_largest(fails, 0.999 * most, stopped))
-    nearer, farther, tilt = tolerances
     ends = [landing(plate, at, nm, flat_first)[0] for nm in (LINE_F_NM, LINE_C_NM)]
     apart = ((ends[0] - ends[1]) ** 2).sum(axis=1)
     lit = float(plate.facets[:, 2].sum())
     share = _inside(xy, flux, fit, target)
     report(1.0, "")
     width = fit.pixel * target.shape[1]
-    return PlateReport(
-        plate,
-        flat_first,
-        at,
-        focus,
-        fit,
-        error,
-        share / lit,
-        float(flux.sum()) / lit,
-        width,
-        math.sqrt(float((flux * apart).sum() / flux.sum())),
-        nearer,
-        farther,
-        tilt,
-        picture,
-        target,
-    )
+    passed, blur = float(flux.sum()) / lit, math.sqrt(float((flux * apart).sum() / flux.sum()))
+    shares, (nearer, farther, tilt) = (error, share / lit, passed), tolerances
+    return PlateReport(plate, flat_first, at, focus, fit, *shares, width, blur, nearer, farther, tilt, picture, target)
 
 
 # ---- pictures ---------------------------------------------------------------------------------

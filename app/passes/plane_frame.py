@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_SIDE = np.array([0.1, -0.4, 0.9])
+"""On which a plane's normal lies: not on one that the rounding of its points decides, which differs between frames."""
+
 
 @dataclass(frozen=True)
 class PlaneFrame:
@@ -31,6 +34,7 @@ def plane_frame(points: np.ndarray) -> PlaneFrame:
     """The frame of coplanar `points`; its axes follow the coordinate axes where they can."""
     centre = points.mean(axis=0)
     normal = np.linalg.svd(points - centre, full_matrices=False)[2][2]
+    normal = np.copysign(1.0, normal @ _SIDE) * normal
     guide = np.eye(3)[0] if abs(normal[0]) < 0.9 else np.eye(3)[1]
     first = guide - normal * (guide @ normal)
     first /= np.linalg.norm(first)

@@ -2,8 +2,8 @@
 
 Each is the difference of two pictures over twice a small step. Both have the same random numbers, the same lattices of
 light and the same texels: what does not depend on the parameter is the same in both to the bit, and what does changes
-smoothly, so that chance, which would be divided by the step, drops out. What remains of it is told by two halves of the
-photons.
+smoothly, so that chance, which would be divided by the step, drops out. What remains of it, and of the blur of
+footprints, is told by a quarter of the photons.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from ..base.generators import mapped
 from ..edit.glass import bent
 from ..edit.parameters import Stage, apply, parameter, parts, value_of
 from ..gpu.context import Context
+from ..model.scene import SceneObject
 from ..model.settings import RenderSettings
 from .bake import placement
 from .frames import FrameRenderer, Picture
@@ -33,8 +34,11 @@ _LARGEST, _TRIES, _TRIED = 8.0, 3, 1 << 15
 _BANDS, _PHOTONS_A_BAND = 16, 1 << 13
 """Spectral bands: within one, footprints are as broad as at its middle. That misses little of a picture, and much of
 what dispersion changes in a focus."""
-_OTHER_HALF = 1 << 31
-"""Seed of the second half of the photons, over the first one's."""
+_OTHER_SEED = 1 << 31
+"""Of the quarter of the photons, over that of all."""
+_WORSE, _WORSE_SEEN = 3.0, 5.0**0.5
+"""By how many errors of all photons, at least, a quarter of them differs: four times the blur and the chance of a
+lattice, in pictures twice the chance of the camera's samples."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +50,7 @@ class Derivative:
     step: float
     """The parameter's change to either side."""
     noise: float
-    """Standard deviation of `picture.rgb` by chance, as a share of its norm; NaN where it was not asked for."""
+    """Error of `picture.rgb` by chance and blur, as a share of its norm; NaN where it was not asked for."""
 
 
 @dataclass(frozen=True)
@@ -72,43 +76,43 @@ def gradient(
     """Of what `settings.layer` shows, by each of `paths` (`edit.parameters`, and `INDEX`), pausing with the share done.
 
     `steps`: of parameters; those of others are found by a few photons. `window`: `MapFit.window` of a map. `noise`: by
-    two halves of the photons and of the camera's samples, whose difference says it. Raises `UserError`."""
+    a quarter of the photons and of the camera's samples as well, whose difference says it. Raises `UserError`."""
     for path in paths:
         check_path(stage, path)
     photons = settings.photons or stage.scene.render.photons
     few = _with_bands(replace(settings, photons=min(photons, _TRIED), seconds=None, spp=1))
-    halves = [_with_bands(replace(settings, photons=photons))]
+    runs = [_with_bands(replace(settings, photons=photons))]
     if noise:
-        spp = max(1, CameraSampling.of(settings).budget // 2)
-        first = _with_bands(replace(settings, photons=max(1, photons // 2), spp=spp))
-        halves = [first, replace(first, seed=(settings.seed + _OTHER_HALF) & 0xFFFFFFFF)]
+        spp, seed = max(1, CameraSampling.of(settings).budget // 4), (settings.seed + _OTHER_SEED) & 0xFFFFFFFF
+        runs.append(replace(runs[0], photons=max(1, photons // 4), spp=spp, seed=seed))
+    worse = _WORSE if settings.layer.startswith("map:") else _WORSE_SEEN
     found: list[Derivative] = []
-    base, where = None, None
+    base: Picture | None = None
+    where = None
     for number, path in enumerate(paths):
         h = (steps or {}).get(path) or (yield from mapped(_step(context, stage, few, path, window), lambda share: 0.0))
-        drawn: list[list[Picture]] = []
-        for half in halves:
-            either = sides(stage, path, h)
-            renderer = FrameRenderer(context, half, either, window=window)
-            wanted = (*either, stage)[: 3 if base is None else 2]
-            drawn.append([])
+        either = sides(stage, path, h)
+        differences: list[Picture] = []
+        for run in runs:
+            renderer = FrameRenderer(context, run, either, window=window)
+            wanted = [*either, stage] if base is None else either
+            drawn: list[Picture] = []
             try:
                 for one in wanted:
                     for share in renderer.steps(one):
-                        done = (len(drawn[-1]) + share) / len(wanted)
-                        yield (number + (len(drawn) - 1 + done) / len(halves)) / len(paths)
-                    drawn[-1].append(renderer.picture)
+                        done = (len(drawn) + share) / len(wanted)
+                        yield (number + (len(differences) + done) / len(runs)) / len(paths)
+                    drawn.append(renderer.picture)
                 if where is None and settings.layer.startswith("map:"):
                     where = placement(renderer.light)
                 window = window if renderer.window is None else renderer.window
             finally:
                 renderer.release()
-        if base is None:
-            base = _mean([pictures[2] for pictures in drawn])
-        each = [_sum(low, high, -0.5 / h, 0.5 / h) for low, high, *_ in drawn]
-        its = _mean(each)
-        apart = float(np.linalg.norm(each[0].rgb - each[-1].rgb)) / 2.0 if noise else np.nan
-        found.append(Derivative(path, its, h, apart / max(float(np.linalg.norm(its.rgb)), 1e-300)))
+            base = base or drawn[2]
+            differences.append(_difference(drawn[0], drawn[1], h))
+        its, norm = differences[0], max(float(np.linalg.norm(differences[0].rgb)), 1e-300)
+        apart = float(np.linalg.norm(its.rgb - differences[1].rgb)) if noise else np.nan
+        found.append(Derivative(path, its, h, apart / worse / norm))
     assert base is not None, "there are paths"
     return Gradient(base, tuple(found), where)
 
@@ -118,16 +122,12 @@ def _with_bands(settings: RenderSettings) -> RenderSettings:
     return replace(settings, least_bands=int(np.clip(settings.photons // _PHOTONS_A_BAND, 1, _BANDS)))
 
 
-def _mean(pictures: Sequence[Picture]) -> Picture:
-    """Of one picture, or of two."""
-    return _sum(pictures[0], pictures[-1], 0.5, 0.5)
-
-
-def _sum(a: Picture, b: Picture, of_a: float, of_b: float) -> Picture:
+def _difference(low: Picture, high: Picture, h: float) -> Picture:
+    """Over twice `h`."""
     spectral = None
-    if a.spectral is not None and b.spectral is not None:
-        spectral = (of_a * a.spectral + of_b * b.spectral).astype(np.float32)
-    return Picture((of_a * a.rgb + of_b * b.rgb).astype(np.float32), spectral, a.bin_edges_nm)
+    if low.spectral is not None and high.spectral is not None:
+        spectral = (high.spectral - low.spectral) / np.float32(2.0 * h)
+    return Picture((high.rgb - low.rgb) / np.float32(2.0 * h), spectral, low.bin_edges_nm)
 
 
 def _step(
@@ -165,10 +165,6 @@ def _known(path: str) -> str:
     return path.removesuffix(f".{INDEX}") + ".n_d" if path.endswith(f".{INDEX}") else path
 
 
-def _is_glass(stage: Stage, path: str) -> bool:
-    return parts(stage.scene, _known(path))[2] in ("n_d", "V_d", "dispersion_gain")
-
-
 def first_step(stage: Stage, path: str) -> float:
     """A small change of a parameter: of an index, of turns in degrees, of anything else as a share of it."""
     field = path.rpartition(".")[0].rpartition(".")[2], path.rpartition(".")[2]
@@ -198,15 +194,12 @@ def sides(stage: Stage, path: str, h: float) -> list[Stage]:
 def nudged(stage: Stage, path: str, change: float) -> Stage:
     """`stage` with one parameter changed; a glass keeps the rest of its curve."""
     head, name, field = parts(stage.scene, _known(path))
-    if head != "objects" or not _is_glass(stage, path) or field == "dispersion_gain":
+    if head != "objects" or field not in ("n_d", "V_d"):
         return apply(stage, path, value_of(stage, path) + change)
-    items = tuple(
-        replace(
-            item,
-            material=item.material.changed(dispersion=bent(item.material.dispersion, path.rpartition(".")[2], change)),
-        )
-        if item.name == name
-        else item
-        for item in stage.scene.objects
-    )
+
+    def changed(item: SceneObject) -> SceneObject:
+        dispersion = bent(item.material.dispersion, path.rpartition(".")[2], change)
+        return replace(item, material=item.material.changed(dispersion=dispersion))
+
+    items = tuple(changed(item) if item.name == name else item for item in stage.scene.objects)
     return replace(stage, scene=replace(stage.scene, objects=items))

@@ -9,11 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from ..base.errors import UserError, suggestion
+from ..base.errors import UserError
 from ..base.files import TABLE_BYTES, read_text, reason_of
 from ..base.image_io import read_image
 from ..edit.parameters import Stage
 from ..gpu.context import Context
+from ..model.naming import place_of
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..model.vectors import Vec3
@@ -52,15 +53,8 @@ class Target:
     """Wanted instead of `values`, which are a line: see `solving.width_of`; as a share of the line."""
 
     def __post_init__(self) -> None:
-        values, edges = self.values, self.bin_edges_nm
-        channels = 3 if edges is None else len(edges) - 1
-        if values.ndim != 3 or values.shape[2] != channels or not values.size or np.shape(self.corners) != (3, 3):
-            raise UserError(
-                f"a target of shape {values.shape} is none: give rows, columns and "
-                f"{channels} {'colours' if edges is None else 'bins'}, and three corners"
-            )
-        if not np.isfinite(values).all() or not np.abs(values).max() > 0.0:
-            raise UserError("the target is dark or not finite: give light that is to be matched")
+        if not np.isfinite(self.values).all() or not np.abs(self.values).max(initial=0.0) > 0.0:
+            raise UserError("the target is dark, empty or not finite: give light that is to be matched")
 
     @property
     def bins(self) -> int:
@@ -106,24 +100,17 @@ class Target:
 
 def _between(texels: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Texels (H, W, c) at places in texels, bilinear, those at the border going on."""
-    limits = np.array(texels.shape[:2]) - 1
-    x, y = np.clip(x, 0.0, limits[1]), np.clip(y, 0.0, limits[0])
-    i, j = np.minimum(x.astype(int), max(limits[1] - 1, 0)), np.minimum(y.astype(int), max(limits[0] - 1, 0))
-    i1, j1 = np.minimum(i + 1, limits[1]), np.minimum(j + 1, limits[0])
-    u, v = (x - i)[..., None], (y - j)[..., None]
-    low = (1.0 - u) * texels[j, i] + u * texels[j, i1]
-    return (1.0 - v) * low + v * ((1.0 - u) * texels[j1, i] + u * texels[j1, i1])
+    from scipy.ndimage import map_coordinates
+
+    channels = np.moveaxis(texels, -1, 0)
+    return np.stack([map_coordinates(each, (y, x), order=1, mode="nearest") for each in channels], axis=-1)
 
 
 def glass_called(scene: Scene, name: str) -> int:
     """Index of an object whose glass may be another one. Raises `UserError`."""
-    glasses = [o.name for o in scene.objects if o.material.transmits and not o.material.is_crystal]
-    if name not in glasses:
-        listed = ", ".join(f"'{known}'" for known in glasses) or "none"
-        raise UserError(
-            f"scene '{scene.name}' has no object of glass called '{name}'{suggestion(name, glasses)}; it has {listed}"
-        )
-    return [item.name for item in scene.objects].index(name)
+    glasses = {o.name: i for i, o in enumerate(scene.objects) if o.material.transmits and not o.material.is_crystal}
+    place_of(name, list(glasses), f"scene '{scene.name}' has no object of glass called")
+    return glasses[name]
 
 
 def flat_receiver(scene: Scene, places: Sequence[Vec3] = ()) -> str:

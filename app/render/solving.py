@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TypeVar
 
 import numpy as np
 
 from ..base.errors import UserError
-from ..base.generators import mapped
+from ..base.generators import part_of
 from ..base.tone_map import luminance
 from ..edit.glass import set_dispersion
 from ..edit.parameters import Stage, value_of
 from ..edit.solved import Fit, Match, Ranked
 from ..gpu.context import Context
+from ..gpu.shader import forget_programs, keep_programs
 from ..model.optics import catalogue, glass
 from ..model.optics.glass import Dispersion
 from ..model.settings import RenderSettings
@@ -30,8 +30,8 @@ from .gradient import INDEX, Gradient, gradient, nudged
 from .light_target import Target, wanted
 
 T = TypeVar("T")
-_SCANNED, _LEVELS, _TRIED = 20, 6, 1 << 15
-"""Glasses that are tried at first, after the scene's own; how often more are; photons of each."""
+_SCANNED, _LEVELS, _TRIED = 20, 5, 1 << 15
+"""Glasses that are tried at first after the scene's own, and next to the nearest; how often more; photons of each."""
 _NEAR, _LIT, _HARDLY = 0.3, 0.6, 0.95
 """What their blurred light may differ by, of the scene's own glass, of one of some and of one of many, to begin with
 it."""
@@ -68,26 +68,23 @@ class Solver:
 
     def fit(self, paths: Sequence[str]) -> Generator[float, None, Fit]:
         """Gauss and Newton's method from the scene as it is, pausing with the share done."""
-        at, taken, error = np.zeros(len(paths)), 0, np.inf
-        found: tuple[np.ndarray, np.ndarray, float] | None = None
+        at, taken = np.zeros(len(paths)), 0
         if self.target.width is not None and len(paths) > 1:
             raise UserError("a width fixes one number only: give one parameter")
         for number, blur in enumerate(self._blurs):
             for step in range(_STEPS):
                 begun = (number + step / _STEPS) / len(self._blurs)
-                columns = yield from mapped(
-                    self._columns(at, paths, blur), partial(_within, begun, 1.0 / (len(self._blurs) * _STEPS))
-                )
+                columns = yield from part_of(self._columns(at, paths, blur), begun, 1.0 / (len(self._blurs) * _STEPS))
                 move, covariance, error = self._solved(columns, blur)
                 taken += 1
-                size = float(np.linalg.norm(columns[:, 1:] @ move) / np.linalg.norm(columns[:, 0]))
-                at = at + move * min(1.0, _TRUST / max(size, 1e-12))
-                found = at, covariance, error
+                light = max(float(np.linalg.norm(columns[:, 0])), 1e-300)
+                size = float(np.linalg.norm(columns[:, 1:] @ move)) / light
+                # Those that do nearly the same must not run away against each other.
+                most = float((np.linalg.norm(columns[:, 1:], axis=0) * np.abs(move)).max()) / light
+                at = at + move * min(1.0, _TRUST / max(most, size, 1e-12))
                 if size < 1e-3 or (blur and size < 0.05):
                     break
-        assert found is not None
         self._check_ends(columns)
-        at, covariance, error = found
         start = {path: 0.0 if path.endswith(f".{INDEX}") else value_of(self.stage, path) for path in paths}
         values = {path: start[path] + float(change) for path, change in zip(paths, at, strict=True)}
         deviations = dict(zip(paths, np.sqrt(np.diag(covariance)).tolist(), strict=True))
@@ -100,7 +97,7 @@ class Solver:
             stage = nudged(stage, path, float(change)) if change else stage
         found = yield from self._gradient(stage, paths)
         pictures = [found.base, *(each.picture for each in found.derivatives)]
-        return np.stack([self._shown(p, found, blur).ravel() for p in pictures], axis=-1)
+        return np.stack([self._colours(p, found.placement, blur).ravel() for p in pictures], axis=-1)
 
     # ---- glasses -----------------------------------------------------------------------------
 
@@ -110,25 +107,31 @@ class Solver:
         entries = [e for e in catalogue.entries() if e.dispersion.is_dispersive and self._may_be(index, e.dispersion)]
         curves = np.stack([_at_bins(entry.dispersion, self._edges) for entry in entries])
         start = yield from self._scanned(index, entries, curves)
-        known: dict[str, Gradient] = {}
+        known: dict[int, Gradient] = {}
         names = [entry.qualified_name for entry in entries]
         best, errors, columns = start, np.zeros(0), np.zeros((0, 0))
+
+        def derived(number: int) -> Generator[float, None, Gradient]:
+            if number not in known:
+                its = set_dispersion(self.stage.scene, index, entries[number].dispersion)
+                steps = self._gradient(replace(self.stage, scene=its), [f"objects.{its.objects[index].name}.{INDEX}"])
+                known[number] = yield from part_of(steps, min(0.42 + 0.05 * len(known), 0.8), 0.05)
+            return known[number]
+
         for blur in self._blurs:
             seen: set[int] = set()
             while best not in seen and len(seen) < _STEPS:
                 seen.add(best)
-                begun = min(0.42 + 0.05 * len(known), 0.95)
-                if names[best] not in known:
-                    its = set_dispersion(self.stage.scene, index, entries[best].dispersion)
-                    path = f"objects.{its.objects[index].name}.{INDEX}"
-                    steps = self._gradient(replace(self.stage, scene=its), [path])
-                    known[names[best]] = yield from mapped(steps, partial(_within, begun, 0.05))
-                columns = self._by_bin(known[names[best]], blur)
+                columns = self._by_bin((yield from derived(best)), blur)
                 if not errors.size:
                     self._check(columns, entries[best].dispersion)
                 errors = self._errors(columns, curves - curves[best], blur)
                 last, best = best, int(np.argmin(errors))
             best = last if len(seen) == _STEPS else best
+        tried = _neighbours(known[best], curves - curves[best])
+        errors[tried] = yield from part_of(self._lit(index, [entries[i] for i in tried], 0.0), 0.85, 0.1)
+        if (best := int(np.argmin(errors))) not in known:
+            columns = self._by_bin((yield from derived(best)), 0.0)
         self._check_ends(columns)
         if not errors.min() < _HARDLY:
             raise UserError(
@@ -152,40 +155,53 @@ class Solver:
     def _scanned(
         self, index: int, entries: Sequence[catalogue.Entry], curves: np.ndarray
     ) -> Generator[float, None, int]:
-        """The glass whose blurred light is nearest: the scene's own, or one of some spread over n_d, of more as long as
-        none lights the target. Raises `UserError` where none does."""
-        own = _at_bins(self.stage.scene.objects[index].material.dispersion, self._edges)
-        by_index = np.argsort([entry.dispersion.n_d for entry in entries])
+        """The glass whose blurred light is nearest: the scene's own; or one of some spread over n_d, of more as long as
+        none lights the target, and from there on over those next to it. Raises `UserError` where none does."""
         errors: dict[int, float] = {}
-        for level in range(_LEVELS):
-            ranks = np.linspace(0.01, 0.99, _SCANNED << max(level - 1, 0)) * (len(entries) - 1)
-            chosen = by_index[ranks.astype(int)] if level else [np.abs(curves - own).max(axis=1).argmin()]
+        near = _NEAR if self.target.width is None else _ALIKE
+
+        def nearest(chosen: Sequence[int] | np.ndarray) -> Generator[float, None, int]:
             fresh = [int(i) for i in chosen if int(i) not in errors]
-            found = yield from mapped(
-                self._lit(index, [entries[i] for i in fresh]), partial(_within, 0.07 * level, 0.07)
-            )
-            errors |= dict(zip(fresh, found, strict=True))
-            best = min(errors, key=errors.__getitem__)
-            near = _NEAR if self.target.width is None else _ALIKE
-            if errors[best] < (near if not level else _LIT if level + 1 < _LEVELS else _HARDLY):
-                return best
+            steps = self._lit(index, [entries[i] for i in fresh], _BLURS[0])
+            found = yield from part_of(steps, 0.4 * len(errors) / 700, 0.02)
+            errors.update(zip(fresh, found, strict=True))
+            return min(errors, key=errors.__getitem__)
+
+        own = _at_bins(self.stage.scene.objects[index].material.dispersion, self._edges)
+        best = yield from nearest([int(np.abs(curves - own).max(axis=1).argmin())])
+        if errors[best] < near:
+            return best
+        by_index = np.argsort([entry.dispersion.n_d for entry in entries])
+        for level in range(_LEVELS):
+            ranks = np.linspace(0.01, 0.99, _SCANNED << level) * (len(entries) - 1)
+            best = yield from nearest(by_index[ranks.astype(int)])
+            if errors[best] < _LIT:
+                break
+        last = -1
+        while last != best and _NEAR <= errors[best] < _HARDLY:
+            last = best
+            best = yield from nearest(np.argsort(np.abs(curves - curves[best]).max(axis=1))[:_SCANNED])
+        if errors[best] < _HARDLY:
+            return best
         raise UserError("no glass of the catalogue casts such light there: is the target's place right, and its scene?")
 
-    def _lit(self, index: int, entries: Sequence[catalogue.Entry]) -> Generator[float, None, list[float]]:
-        """What the light of each glass, blurred and of few photons, differs by from the target."""
-        scenes = (set_dispersion(self.stage.scene, index, entry.dispersion) for entry in entries)
-        stages = [replace(self.stage, scene=scene) for scene in scenes]
-        few = replace(self._settings, photons=min(self._settings.photons or _TRIED, _TRIED))
-        renderer = FrameRenderer(self.context, few, stages, window=self.target.window)
-        errors: list[float] = []
-        try:
-            for number, stage in enumerate(stages):
+    def _lit(self, index: int, entries: Sequence[catalogue.Entry], blur: float) -> Generator[float, None, list[float]]:
+        """What the light of each glass, blurred of few photons, differs by from the target."""
+        settings, errors = self._settings, []
+        if blur:
+            settings = replace(settings, photons=min(settings.photons or _TRIED, _TRIED))
+        blur = blur if self.target.width is None else 0.0
+        for number, entry in enumerate(entries):
+            stage = replace(self.stage, scene=set_dispersion(self.stage.scene, index, entry.dispersion))
+            # A renderer each: the spectral axis of several is coarse where some do not disperse.
+            renderer = FrameRenderer(self.context, settings, [stage], window=self.target.window)
+            try:
                 for share in renderer.steps(stage):
-                    yield (number + share) / len(stages)
-                shown = self._colours(renderer.picture, placement(renderer.light), self._blurs[0]).ravel()
-                errors.append(float(self._errors(shown[:, None], np.zeros((1, 0)), _BLURS[0])[0]))
-        finally:
-            renderer.release()
+                    yield (number + share) / len(entries)
+                shown = self._colours(renderer.picture, placement(renderer.light), blur).ravel()
+            finally:
+                renderer.release()
+            errors.append(float(self._errors(shown[:, None], np.zeros((1, 0)), blur)[0]))
         return errors
 
     def _by_bin(self, found: Gradient, blur: float) -> np.ndarray:
@@ -193,10 +209,10 @@ class Solver:
         derivative = found.derivatives[0].picture
         assert derivative.spectral is not None
         alone = derivative.spectral[..., None, :] * np.eye(self.target.bins, dtype=np.float32)
-        columns = [self._shown(found.base, found, blur).ravel()]
+        columns = [self._colours(found.base, found.placement, blur).ravel()]
         for b in range(self.target.bins):
             its = Picture(derivative.rgb, np.ascontiguousarray(alone[..., b, :]), derivative.bin_edges_nm)
-            columns.append(self._shown(its, found, blur).ravel())
+            columns.append(self._colours(its, found.placement, blur).ravel())
         return np.stack(columns, axis=-1)
 
     def _check(self, columns: np.ndarray, dispersion: Dispersion) -> None:
@@ -240,9 +256,6 @@ class Solver:
         found = yield from gradient(self.context, stage, self._settings, paths, self._steps, self.target.window)
         self._steps |= {each.path: each.step for each in found.derivatives}
         return found
-
-    def _shown(self, picture: Picture, of: Gradient, blur: float) -> np.ndarray:
-        return self._colours(picture, of.placement, blur)
 
     def _colours(self, picture: Picture, placement: object, blur: float) -> np.ndarray:
         """A picture in the target's cells and channels."""
@@ -309,9 +322,22 @@ def solution(
 ) -> Generator[float, None, T]:
     """What `work` finds for the target that `wanted` makes of the rest, pausing with the share done."""
     its = wanted(context, stage, settings, receiver, values, between, width)
-    target = yield from mapped(its, partial(_within, 0.0, 0.05))
-    steps = work(Solver(context, stage, settings, target))
-    return (yield from mapped(steps, partial(_within, 0.05, 0.95)))
+    keep_programs(context.ctx)
+    try:
+        target = yield from part_of(its, 0.0, 0.05)
+        return (yield from part_of(work(Solver(context, stage, settings, target)), 0.05, 0.95))
+    finally:
+        forget_programs(context.ctx)
+
+
+def _neighbours(found: Gradient, moves: np.ndarray) -> np.ndarray:
+    """Numbers of the `moves` (m, bins) of the index that change the light least. In no bin it changes by more than all
+    of it: glasses may be far apart in the violet alone, beyond some makers' data."""
+    derivative, base = found.derivatives[0].picture.spectral, found.base.spectral
+    assert derivative is not None and base is not None
+    moved = np.abs(moves) * np.linalg.norm(derivative, axis=(0, 1))
+    changes = np.minimum(moved, np.linalg.norm(base, axis=(0, 1)))
+    return np.argsort((changes**2).sum(axis=1), kind="stable")[:_SCANNED]
 
 
 def width_of(light: np.ndarray) -> np.ndarray:
@@ -327,10 +353,6 @@ def width_of(light: np.ndarray) -> np.ndarray:
             after = (its[last] - half) / (its[last] - its[last + 1])
             found[row] = (last - first + before + after) / light.shape[1]
     return found
-
-
-def _within(begun: float, part: float, share: float) -> float:
-    return begun + part * share
 
 
 def _blurred(cells: np.ndarray, share: float) -> np.ndarray:

@@ -65,6 +65,7 @@ def view_model_of(session: Session) -> ViewModel:
         readings=session.jobs.overlay.readings,
         gem=session.jobs.gem.reading(session.state) if session.state.preferences.panels.gem else NOT_YET,
         derivative=session.jobs.exports.found.entry("derivative"),
+        answer=session.jobs.exports.found.entry("answer"),
         plate=session.jobs.exports.found.entry("plate"),
         job=session.jobs.exports.job,
         engine_rests=session.jobs.engine_rests and session.jobs.exports.job is not None,

@@ -22,14 +22,18 @@ from .view_model import Found
 if TYPE_CHECKING:
     import moderngl
 
+    from ..edit.solved import Fit, Match
     from ..edit.state import State
     from ..gpu.context import Context
     from ..gpu.context_thread import ContextThread
+    from ..render.solving import Solver
 
 T = TypeVar("T")
 _LARGEST_PX = 480
 """Longer side of a derivative."""
 _PAUSE_S = 0.02
+_GLASSES = 5
+"""That are listed."""
 
 
 class FoundPictures:
@@ -47,8 +51,8 @@ class FoundPictures:
     def entry(self, name: str) -> Found | None:
         """With its texture; None while nothing was found."""
         found = self._found.get(name)
-        if found is None:
-            return None
+        if found is None or found.codes is None:
+            return found
         kept = self._textures.get(name)
         if kept is None or kept[0] is not found:
             if kept is not None:
@@ -73,7 +77,7 @@ def solving_job(
     notices = FrameNotices()
     match request:
         case requests.MatchGlass():
-            words, work = _match(context, request, state, notices)
+            words, work = _match(context, request, state, found, notices)
         case requests.Derive():
             words, work = _derive(context, request, state, found)
         case requests.CheckPlate():
@@ -82,7 +86,7 @@ def solving_job(
 
 
 def _match(
-    context: Context, request: requests.MatchGlass, state: State, notices: FrameNotices
+    context: Context, request: requests.MatchGlass, state: State, found: FoundPictures, notices: FrameNotices
 ) -> tuple[Words, Iterator[float]]:
     from ..render.gradient import check_path
     from ..render.light_target import flat_receiver, read_target
@@ -94,26 +98,24 @@ def _match(
     values = None if request.file is None else read_target(request.file)
     wish = receiver, values, request.between or None, request.width
 
-    def work() -> Iterator[float]:
-        if request.of:
-            fit = yield from solution(context, stage, settings, *wish, lambda its: its.fit(request.of))
-            sure = {path: f" ± {sd:.1g}" if np.isfinite(sd) else "" for path, sd in fit.deviations.items()}
-            notices.take(f"{path} {value:.6g}{sure[path]}" for path, value in fit.values.items())
-            notices.take([f"what is left differs by {100.0 * fit.error:.3g} %"])
-            return
-        found = yield from solution(context, stage, settings, *wish, lambda its: its.match(request.index, 3))
-        notices.take(
-            f"{g.name} (n_d {g.n_d:.4f}, V_d {g.V_d:.1f}) differs by {100.0 * g.error:.2g} %" for g in found.glasses
-        )
+    for path in request.of:
+        check_path(stage, path)
+    target = (
+        f"a width of {request.width:g}" if request.width else request.file.name if request.file else "its light now"
+    )
+    title = "Fit of " + ", ".join(request.of) if request.of else f"Glass of {scene.objects[request.index].name}"
 
-    if request.of:
-        for path in request.of:
-            check_path(stage, path)
-        words = "Fit of " + ", ".join(request.of), f"Numbers that light '{receiver}' so:", "Nothing was fitted."
-        return Words(*words), work()
-    name = scene.objects[request.index].name
-    lit = f"Glasses that light '{receiver}' most alike:"
-    return Words(f"Glass of {name}", lit, "No glass was looked for any more."), work()
+    def solve(its: Solver) -> Generator[float, None, Fit | Match]:
+        return (yield from its.fit(request.of) if request.of else its.match(request.index, _GLASSES))
+
+    def work() -> Iterator[float]:
+        its = yield from solution(context, stage, settings, *wish, solve)
+        rows = (("Asked", title), ("By", f"{target}, on '{receiver}'"), *its.rows())
+        found.keep("answer", Found((scene,), rows))
+        (label, text), *_ = its.rows()
+        notices.take([f"{label}: {text}"])
+
+    return Words(title, "What was found is in the Solve panel.", "Nothing was found."), work()
 
 
 def _derive(

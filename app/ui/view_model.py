@@ -86,12 +86,12 @@ class JobInfo:
 
 @dataclass(frozen=True)
 class Found:
-    """What a job found, with a picture of it."""
+    """What a job found, some with a picture of it."""
 
     of: tuple[object, ...]
     """What it was found for."""
     rows: tuple[tuple[str, str], ...]
-    codes: np.ndarray
+    codes: np.ndarray | None = None
     """uint8 (h, w, 3), sRGB."""
     texture: int = 0
     """Texture id of that."""
@@ -158,6 +158,8 @@ class ViewModel:
     gem: GemReading = NOT_YET
     """Of the selected stone, while its panel is open."""
     derivative: Found | None = None
+    answer: Found | None = None
+    """Glasses or numbers that light a receiver as was wanted."""
     plate: Found | None = None
     job: JobInfo | None = None
     engine_rests: bool = False

@@ -123,8 +123,16 @@ def test_a_number_is_fitted_in_the_window(gl: Context, tmp_path: Path) -> None:
     exports = Exports(gl)
     shown = Shown(None, None, 0.0, 0)  # type: ignore[arg-type]
     exports.begin(ask, state, shown)
-    note = finished(exports)
-    assert float(note.split("objects.prism.V_d ")[1].split()[0]) == pytest.approx(20.0, abs=0.5)
+    assert "objects.prism.V_d: " in finished(exports)
+    answer = exports.found.entry("answer")
+    assert answer is not None and answer.is_of(state.scene) and not answer.is_of(scene_state("spectrum").scene)
+    rows = dict(answer.rows)
+    assert float(rows["objects.prism.V_d"].split()[0]) == pytest.approx(20.0, abs=0.5)
+    assert rows["By"] == "wanted.npy, on 'screen'" and rows["what is left"].startswith("differs by")
+    with PanelRig(gl, draw_solve, replace(state, selection=Selection("object", 0))) as rig:
+        rig.view_model = replace(rig.view_model, answer=answer)
+        rig.frame(2)
+        assert {"Asked", "objects.prism.V_d", "What is left"} <= set(rig.items.items)
     with pytest.raises(UserError, match="changes no light"):
         exports.begin(replace(ask, of=("camera.position.x",)), state, shown)
     exports.release()

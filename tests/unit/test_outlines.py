@@ -69,3 +69,14 @@ def test_which_objects_have_borders() -> None:
     corner = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]], float)
     notched = Mesh("corner", corner, np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 5]]))
     assert not has_borders(SceneObject("corner", notched, Diffuse()))
+
+
+def test_a_plane_keeps_its_frame() -> None:
+    """Whatever rounding its points have: maps of neighbouring frames would lie upside down to each other."""
+    rng = np.random.default_rng(1)
+    for normal in ((-0.907, 0.0, 0.421), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)):
+        across = np.cross(normal, (0.3, 0.8, 0.5))
+        square = (SQUARE - 0.5) @ np.stack([across, np.cross(normal, across)])
+        moved = [(square + rng.normal(size=3)) * rng.uniform(0.1, 3.0) for _ in range(100)]
+        axes = np.stack([plane_frame(points.astype(np.float32).astype(float)).axes for points in moved])
+        np.testing.assert_allclose(axes, np.broadcast_to(axes[0], axes.shape), atol=1e-4)

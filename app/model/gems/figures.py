@@ -88,12 +88,10 @@ def stone_of(mesh: Mesh, glass: Dispersion, notes: tuple[str, ...] = ()) -> Ston
     scale = np.eye(4) / (0.5 * float(np.linalg.norm(high - low)))
     scale[:3, 3], scale[3, 3] = -scale[0, 0] * 0.5 * (low + high), 1.0
     mesh = mesh.transformed(scale)
-    corners = mesh.corners()
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    corners = corners[areas > 1e-14]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    normals /= areas[:, None]
+    vectors = mesh.area_vectors()
+    areas = np.linalg.norm(vectors, axis=1)
+    kept = areas > 1e-14
+    corners, areas, normals = mesh.corners()[kept], areas[kept], vectors[kept] / areas[kept, None]
     tree = build_bvh(corners.astype(np.float32), use_cache=len(corners) > _PIECE)
     nodes = tree.nodes
     bounds = np.hstack([nodes["bounds_min"], nodes["bounds_max"]]).astype(np.float64)

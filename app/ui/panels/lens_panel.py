@@ -4,7 +4,6 @@ plate draws, compared with its target."""
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 
 from imgui_bundle import imgui
 
@@ -15,8 +14,8 @@ from ...model.io.picture_files import PICTURE_SUFFIXES
 from ...model.lens_scene import lens_in
 from ...model.optics.lens_design import HEADINGS, lens_table
 from ..view_model import ViewModel
-from . import file_browser, widgets
-from .solve_panel import draw_found
+from . import widgets
+from .solve_panel import draw_found, target_row
 from .wavelength_table import draw_wavelength_table
 
 
@@ -43,9 +42,7 @@ def _plate(state: State, view_model: ViewModel, index: int) -> State:
     solve = state.solve
     widgets.hint(f"{item.name} is no lens. Is it a plate that draws a picture with parallel light?")
     target, tip = solve.plate_target, "The picture that the plate was made for."
-    if widgets.file_field("Target", "none" if target is None else target.name, tip=tip):
-        folder = view_model.path.parent if view_model.path is not None else Path.home()
-        file_browser.ask(file_browser.Question("Target of the plate", PICTURE_SUFFIXES, target or folder, _with_target))
+    target_row(state, view_model, "plate_target", PICTURE_SUFFIXES, tip=tip)
     tip = "From the plate's far side to the screen; 0: where the picture is most like the target."
     distance = widgets.drag("Distance", solve.plate_distance, 0.0, unit="units", tip=tip)
     state = replace(state, solve=replace(solve, plate_distance=distance))
@@ -57,7 +54,3 @@ def _plate(state: State, view_model: ViewModel, index: int) -> State:
         of = item.mesh, item.object_to_world, item.material.dispersion, target, distance or None
         draw_found(found, is_present=found.is_of(*of))
     return state
-
-
-def _with_target(state: State, _view_model: ViewModel, path: Path) -> State:
-    return replace(state, solve=replace(state.solve, plate_target=path))

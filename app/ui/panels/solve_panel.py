@@ -3,7 +3,6 @@ light."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -73,9 +72,8 @@ def _glass(state: State, view_model: ViewModel) -> State:
     wanted = widgets.combo("Wanted", _WANTED, solve.wanted, tip=_WANTED_TIPS[solve.wanted])
     solve = replace(solve, wanted=wanted)
     if wanted == "picture":
-        name = "none" if solve.file is None else solve.file.name
-        if widgets.file_field("Target", name, tip="A picture, or a .csv of spectra, a line a place."):
-            _ask("Light that is wanted", (*READ_SUFFIXES, ".csv"), view_model, _with_file)
+        tip = "A picture, or a .csv of spectra, a line a place."
+        target_row(state, view_model, "file", (*READ_SUFFIXES, ".csv"), tip=tip)
     elif wanted == "width":
         tip = "Full width at half maximum of the light along the ruler's line."
         solve = replace(solve, width=widgets.drag("Width", solve.width, 0.0, unit="units", tip=tip))
@@ -91,7 +89,11 @@ def _glass(state: State, view_model: ViewModel) -> State:
     ask = MatchGlass(index, file, solve.width if wanted == "width" else None, between)
     if widgets.button(f"Find the glass of {item.name}###find", tip="Rank the catalogue.", enabled=ready, width=-1):
         state = state.asking(ask)
-    return state if wanted == "light" else _numbers(state, view_model, ask, ready=not missing)
+    if wanted != "light":
+        state = _numbers(state, view_model, ask, ready=not missing)
+    if (found := view_model.answer) is not None:
+        draw_found(found, is_present=found.is_of(state.scene))
+    return state
 
 
 def _numbers(state: State, view_model: ViewModel, ask: MatchGlass, *, ready: bool) -> State:
@@ -111,23 +113,26 @@ def _numbers(state: State, view_model: ViewModel, ask: MatchGlass, *, ready: boo
     return state
 
 
-def _with_file(state: State, _view_model: ViewModel, path: Path) -> State:
-    return replace(state, solve=replace(state.solve, file=path))
+def target_row(state: State, view_model: ViewModel, field: str, suffixes: tuple[str, ...], *, tip: str) -> None:
+    """A row for the file that `field` of what the panels are set to holds."""
+    present = getattr(state.solve, field)
+    if widgets.file_field("Target", "none" if present is None else present.name, tip=tip):
+        folder = view_model.path.parent if view_model.path is not None else Path.home()
 
+        def chosen(state: State, _view_model: ViewModel, path: Path) -> State:
+            return replace(state, solve=replace(state.solve, **{field: path}))  # type: ignore[arg-type]
 
-def _ask(
-    title: str, suffixes: tuple[str, ...], view_model: ViewModel, then: Callable[[State, ViewModel, Path], State]
-) -> None:
-    folder = view_model.path.parent if view_model.path is not None else Path.home()
-    file_browser.ask(file_browser.Question(title, suffixes, folder, then))
+        file_browser.ask(file_browser.Question("Light that is wanted", suffixes, present or folder, chosen))
 
 
 def draw_found(found: Found, *, is_present: bool) -> None:
-    """What a job found, and a picture of it."""
+    """What a job found, and a picture of it where there is one."""
     if not is_present:
         widgets.note("Something has changed since: this was found before.")
     for label, text in found.rows:
-        widgets.read_out(label[:1].upper() + label[1:], text, tip=text)
+        widgets.read_out(label if "." in label else label[:1].upper() + label[1:], text, tip=text)
+    if found.codes is None:
+        return
     height, width = found.codes.shape[:2]
     across = min(imgui.get_content_region_avail().x, float(2 * width))
     imgui.image(imgui.ImTextureRef(found.texture), imgui.ImVec2(across, across * height / width))
