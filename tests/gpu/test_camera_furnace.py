@@ -15,7 +15,9 @@ from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.geometry.primitives_gem import brilliant
 from spectrasplat.model.lights import DirectionalLight
-from spectrasplat.model.optics.glass import from_abbe
+from spectrasplat.model.materials.coating import Coating
+from spectrasplat.model.optics.glass import constant, from_abbe
+from spectrasplat.model.optics.thin_films import Film, Layer
 from spectrasplat.model.scene import (
     Black,
     Camera,
@@ -50,6 +52,9 @@ def solids(name: str) -> list[SceneObject]:
             return [SceneObject("prism", primitives.prism(60.0, 1.0, 1.0), glass("N-SF11"), turned)]
         case "slab":
             return [SceneObject("slab", primitives.box((1.2, 0.3, 1.0)), FLINT, turned)]
+        case "coated":
+            film = Coating(Film((Layer(constant(2.3), 60.0), Layer(constant(1.38), 100.0))))
+            return [SceneObject("ball", ball(0.6), Dielectric(from_abbe(1.7, 10.0), coating=film))]
         case "brilliant":
             return [SceneObject("gem", brilliant(1.2), glass("diamond"), turned)]
         case _:
@@ -69,6 +74,7 @@ def covered(gl, objects: list[SceneObject]) -> np.ndarray:
         ("ball", "map", 1),
         ("ball", "background", 4),
         ("prism", "background", 1),
+        ("coated", "map", 4),
         ("slab", "background", 4),
         ("brilliant", "map", 4),
         ("brilliant", "background", 1),
