@@ -85,7 +85,7 @@ class _SceneBench:
         self._scene, self._start_seconds = with_flat_faces(with_panorama_lights(scene)), start_seconds
         self._settings = store.result.settings
         self._size = picture_size(scene, self._settings)
-        key = subject.key(scene, *self._size)
+        key = subject.key(self._scene, *self._size)
         earlier = store.scene(name)
         if earlier is not None and earlier.reference is not None and earlier.reference.key != key:
             raise UserError(

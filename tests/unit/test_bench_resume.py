@@ -22,6 +22,7 @@ from spectrasplat.bench.results import BenchResult, BenchSettings, ReferenceInfo
 from spectrasplat.bench.store import Store
 from spectrasplat.bench.subjects import Subject
 from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, RenderDefaults, Scene, SceneObject
 from spectrasplat.reference import metrics
@@ -105,7 +106,10 @@ def relative_error(xyz: np.ndarray, reference_image: ReferencePicture) -> float:
 
 def glass_scene() -> Scene:
     mesh = make_mesh("triangle", np.eye(3), np.array([[0, 1, 2]]))
-    objects = (SceneObject("glass", mesh, Dielectric(find("N-SF11"))), SceneObject("table", mesh, Diffuse()))
+    objects = (
+        SceneObject("glass", mesh, Dielectric(find("N-SF11"))),
+        SceneObject("table", box((1.0, 1.0, 1.0)), Diffuse()),
+    )
     return Scene("made up", Camera((0.0, -5.0, 1.0), (0.0, 0.0, 0.0)), (), objects, render=RenderDefaults(960, 720))
 
 
@@ -129,18 +133,18 @@ class Bench:
             store,
             lambda f, t: self.told.append((f, t)),
             self.skipped,
-            Subject(self.rigs.make, self._reference_image, lambda *_: key),
+            Subject(self.rigs.make, self._reference_image, lambda scene, *_: f"{key} {len(scene.objects)}"),
         )  # type: ignore[arg-type]
         return store.result
 
     def _reference_image(
-        self, _scene: Scene, width: int, height: int, seconds: float, progress: Callable[[float, str], None]
+        self, scene: Scene, width: int, height: int, seconds: float, progress: Callable[[float, str], None]
     ) -> tuple[ReferencePicture, ReferenceInfo]:
         self.references += 1
         progress(0.5, "half")
         assert seconds == SETTINGS.reference_seconds
         return ReferencePicture(reference_picture(), np.full((height, width, 3), 1e-9)), ReferenceInfo(
-            "made up", 1, 1.0, 1e-9, "key"
+            "made up", 1, 1.0, 1e-9, f"key {len(scene.objects)}"
         )
 
     def stored(self) -> BenchResult:
