@@ -89,10 +89,11 @@ vec3 summed_change(ShadingFrame frame, vec3 along) {
     return dot(frame.gradient_u, along) * frame.along_u + dot(frame.gradient_v, along) * frame.along_v;
 }
 
-// Derivative of the shading normal along the position derivative `dposition`.
+// Derivative of the shading normal along the position derivative `dposition`. Also where the facet's normal judges at
+// an outline: were it flat there, what it reflects would be a bright speck in the wide glow of its neighbours.
 vec3 normal_column(ShadingFrame frame, vec3 dposition) {
     vec3 dnormal = normalised_derivative(frame.summed, summed_change(frame, dposition));
-    return frame.interpolated != 0u ? dnormal : vec3(0.0);
+    return (frame.interpolated | frame.refused) != 0u ? dnormal : vec3(0.0);
 }
 
 // Shading normal at the place `off` beside the one that was hit.
@@ -132,12 +133,11 @@ Deflection refract_at(ShadingFrame frame, vec3 direction, float eta_it) {
 
 // Derivatives of the turned direction by one column of the incident ray; `dnormal` is the frame's `normal_column`.
 vec3 reflected_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal) {
-    return reflect_column(direction, ddirection, turned.normal, turned.geometric ? vec3(0.0) : dnormal, turned.theta);
+    return reflect_column(direction, ddirection, turned.normal, dnormal, turned.theta);
 }
 
 vec3 refracted_column(Deflection turned, vec3 direction, vec3 ddirection, vec3 dnormal, float eta_it, float deta_it) {
-    return refract_column(direction, ddirection, turned.normal, turned.geometric ? vec3(0.0) : dnormal, turned.theta,
-        eta_it, turned.omega, deta_it);
+    return refract_column(direction, ddirection, turned.normal, dnormal, turned.theta, eta_it, turned.omega, deta_it);
 }
 
 // Where a ray that starts at `origin` has hit, on the surface as exactly as the surface's own coordinates can say.

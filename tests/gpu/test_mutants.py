@@ -255,14 +255,14 @@ MUTANTS = {
     ),
     "columns: flat normals": Mutant(
         "lib/interface.glsl",
-        "return frame.interpolated != 0u ? dnormal : vec3(0.0);",
+        "return (frame.interpolated | frame.refused) != 0u ? dnormal : vec3(0.0);",
         "return vec3(0.0);",
         f"{_COLUMNS}[inner reflections]",
     ),
     "columns: normal not turned inside": Mutant(
         "lib/interface.glsl",
-        "return frame.interpolated != 0u ? dnormal",
-        "return frame.interpolated != 0u ? sign(dot(frame.summed, vec3(1.0))) * dnormal",
+        "return (frame.interpolated | frame.refused) != 0u ? dnormal",
+        "return (frame.interpolated | frame.refused) != 0u ? sign(dot(frame.summed, vec3(1.0))) * dnormal",
         f"{_COLUMNS}[beam]",
     ),
     "columns: mirror forgets the normal": Mutant(
