@@ -404,7 +404,9 @@ void main() {
   sides = mat2(to_uv[0].xy - uv * to_uv[0].z, to_uv[1].xy - uv * to_uv[1].z) / uvw.z;
   float wide = band.y - band.x;
   vec2 lit = wide > 0.0 ? (clamp(support, band.xx, band.yy) - band.x) / wide : vec2(0.0, 1.0), touched = lit, whole = lit;
-  float moves = 0.0;  // sixteenths of a texel, of the edges that matter
+  // Parts of the band: three of what is lit where the density changes, or sixteenths of a texel that edges move.
+  bool is_even = abs(parabola.y) + abs(parabola.z) < 0.005 * parabola.x;
+  float moves = is_even ? 0.0 : 3.0 / max(lit.y - lit.x, 1e-6);
   for (int i = 0; i < list.y; ++i) {
     vec4 start = edge_texel(2 * (list.x + i)), from = seen_line(start), to = seen_line(start + edge_texel(2 * (list.x + i) + 1));
     float h = from.z, dh = to.z - h, r = 0.5 * (abs(from.x) + abs(from.y)) * from.w;
