@@ -10,14 +10,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from .scene import Scene, SceneObject
-from .scene_checks import MAX_OBJECTS
+
+_MOST = 256
+"""Receivers: the search for beams visits all of them, and every one has maps of its own."""
 
 
 def with_flat_faces(scene: Scene) -> Scene:
-    """`scene` with its receivers of few flat faces taken apart; itself where there are none. The same mesh gives the
-    same faces again."""
+    """`scene` with its receivers of few flat faces taken apart; itself where there are none, or too many together. The
+    same mesh gives the same faces again."""
     objects = tuple(each for item in scene.objects for each in _faces(item))
-    return replace(scene, objects=objects) if len(scene.objects) < len(objects) <= MAX_OBJECTS else scene
+    return replace(scene, objects=objects) if len(scene.objects) < len(objects) <= _MOST else scene
 
 
 def _faces(item: SceneObject) -> list[SceneObject]:

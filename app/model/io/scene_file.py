@@ -113,7 +113,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(files.read_text(path, files.SCENE_BYTES))
     except tomllib.TOMLDecodeError as error:
-        raise UserError(f"{path.name} is not valid TOML: {error}; texts need quotes and keys one line each") from error
+        hint = "texts need quotes, numbers a digit before the point, and keys one line each"
+        raise UserError(f"{path.name} is not valid TOML: {error}; {hint}") from error
     except RecursionError as error:
         raise UserError(
             f"{path.name} is not a scene: its lists are nested too deeply; see assets/scenes for examples"
