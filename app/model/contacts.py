@@ -57,8 +57,14 @@ def contacts(scene: Scene) -> list[tuple[int, int]]:
         (int(i), int(j))
         for pairs in _meeting(bounds, slack)
         for i, j in pairs[~glass[pairs].all(axis=1)]
-        if objects[i].name != objects[j].name and reaches(i, j) and reaches(j, i)
+        if not _are_faces(objects[i], objects[j]) and reaches(i, j) and reaches(j, i)
     )
+
+
+def _are_faces(a: SceneObject, b: SceneObject) -> bool:
+    """Whether both are faces of one object."""
+    whole = a.mesh.whole
+    return whole is not None and whole is b.mesh.whole and a.object_to_world is b.object_to_world
 
 
 def standing(scene: Scene) -> list[tuple[int, int]]:
