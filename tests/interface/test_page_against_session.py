@@ -75,7 +75,7 @@ def check(found: dict[str, tuple[float, float]]) -> None:
 
 
 def test_photons_are_as_a_sessions(browser: Browser, tmp_path: Path) -> None:
-    check(errors(browser, tmp_path, ss.Scene(BALL), (96, 64), 8000, 0))
+    check(errors(browser, tmp_path, ss.Scene(BALL), (96, 64), 3000, 0))
 
 
 @pytest.mark.slow
