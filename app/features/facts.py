@@ -328,9 +328,10 @@ class Named(Protocol):
 
 def names(items: Iterable[Named]) -> str:
     """For people."""
-    return listed(list(dict.fromkeys(item.name for item in items)))
+    return listed([item.name for item in items])
 
 
 def listed(words: list[str]) -> str:
-    """The first four, and how many more."""
+    """The first four, each once, and how many more."""
+    words = list(dict.fromkeys(words))
     return ", ".join(words[:4]) + (f" and {len(words) - 4} more" if len(words) > 4 else "")

@@ -265,8 +265,7 @@ def _walk_words(what: str, count: int, size: int) -> str:
 
 def _pair_names(facts: Facts) -> str:
     objects = facts.scene.objects
-    found = [f"{objects[i].name} and {objects[j].name}" for i, j in contacts(facts.scene)]
-    return listed(list(dict.fromkeys(found)))
+    return listed([f"{objects[i].name} and {objects[j].name}" for i, j in contacts(facts.scene)])
 
 
 def _beam_words(facts: Facts) -> str:
