@@ -216,10 +216,10 @@ def _tracing(
         except BaseException:  # also when the page is given up
             traced.release()
             raise
-        if (size := packed_bytes(light.arrays)) <= room:
+        if (size := packed_bytes(light.arrays)) <= room or photons == 1:
             return traced, light
         traced.release()
-        photons = int(0.95 * photons * room / size)
+        photons = max(int(0.95 * photons * room / size), 1)
 
 
 def _receiver(light: TracedLight, name: str | None) -> int:
