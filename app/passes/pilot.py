@@ -127,7 +127,9 @@ def pilot_steps(
             flights += batch.flights
             fullness = max(fullness, batch.fullness)
 
-        piece = LatticeSlice(light, (band,), count, 0, 1, count, (0, 0), (0, 0), 0, 1, light_place=place)
+        piece = LatticeSlice(
+            light, (band,), count, 0, 1, count, (0, 0), (0, 0), 0, 1, light_place=place, keeps_sweeps=True
+        )
         for i in range(slices):
             part = piece.every(every, 0).every(slices, i), domain
             yield from trace.whole([part], keep, depth, split_threshold)

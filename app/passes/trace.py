@@ -129,9 +129,9 @@ WIDEST_TURN = 1.4
 directions of a footprint may differ behind a surface."""
 CARRIED_ON_POINTS = 2e4
 """What rays count as that carry on what beams left, whose number is not known where they are traced."""
-WIDEST_SWEEP = 1.0
-"""How far a ray's direction may change over its band, radians: without a bound some light misses all maps, with a
-narrower one that of a strongly dispersing prism does."""
+WIDEST_SWEEP = 0.5
+"""How far a ray's direction may change over its band, radians, for its spectral columns to be believed: without a bound
+some light misses all maps."""
 WIDEST_ON_SURFACE = 0.06
 """As a share of an object's size (half of its bounds' diagonal): the longest side of a footprint on it, and of what a
 lamp's other points add, where the lattice's own spacing is not longer."""
@@ -420,6 +420,8 @@ class TracePass:
             p["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
         paths = piece.lattice_count * piece.lattices * domain.active_share
         p["paths"], p["widest_turn"] = paths, self._widest_turn(paths)
+        if piece.keeps_sweeps:
+            p["widest_sweep"] = UNBOUNDED
         p["lattice_shift"] = piece.shift[1]
         p["surface_key"] = p["tint_key"] = piece.seed
         p["lattices_together"] = 1 if self._features.spectral_groups else len(piece.bands)

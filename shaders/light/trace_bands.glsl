@@ -2,11 +2,11 @@
 // may not be.
 // Spectral columns are derivatives too. Grazing exits and curved surfaces, again and again inside a solid, make some of
 // them so steep that they would throw the ends of a band all over the scene, and out of it, where no light of the band
-// goes.
+// goes. Such a band stays where its anchor lands: near others like it, so that together they still cover what it would.
 void keep_sweeps_within(inout Path path) {
     for (int g = 0; g < SPECTRAL_GROUPS; ++g) {
         float sweep = length(path.ddirection[SPATIAL + g]) * abs(variable_step(uint(g), path.band.z, path.band.x));
-        float kept = min(1.0, p.widest_sweep / max(sweep, 1e-30));
+        float kept = sweep > p.widest_sweep ? 0.0 : 1.0;
         path.dposition[SPATIAL + g] *= kept;
         path.ddirection[SPATIAL + g] *= kept;
     }
