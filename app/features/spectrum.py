@@ -89,10 +89,7 @@ class SpectrumFeatures:
     landing_cuts: bool = feature(
         "landing cuts",
         lambda facts: (
-            facts.groups > 0
-            and facts.has_columns
-            and bool(facts.glass)
-            and len(facts.having(lambda material: not material.is_specular)) > 1
+            facts.groups > 0 and facts.has_columns and len(facts.having(lambda material: not material.is_specular)) > 1
         ),
         symbol="LANDING_CUTS",
         why="a band may land on several surfaces",

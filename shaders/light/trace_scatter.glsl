@@ -110,8 +110,8 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     float refracted_share = share_of_lobe(event, let_through);
     if (companions.stay) refracted_share = common_share(path, refracted_share, companions.transmittance);
     float at = -1.0, below = 0.0, onset = -1.0;
-    if (BAND_CUTS && HAS_DIELECTRIC) at = splits ? cut_of_band(path, start, slot, event, hit.distance, onset) : border;
-    if (BAND_CUTS && HAS_DIELECTRIC && at >= 0.0) {
+    if (BAND_CUTS) at = splits ? cut_of_band(path, start, slot, event, hit.distance, onset) : border;
+    if (BAND_CUTS && at >= 0.0) {
         // Back to the start of the flight.
         splits = false;
         outcome.absorbed_w = 0.0;
@@ -159,7 +159,7 @@ void scatter(Path path, Path start, Hit hit, Triangle facet, uint kind, Object t
     child = child_of(path, hit, entering);
     lives = rest_lives;
     if (HAS_GRATING && rest_lives) child = rest;
-    if (BAND_CUTS && HAS_DIELECTRIC) {
+    if (BAND_CUTS) {
         if (!RAY_POOL && at >= 0.0) {
             child = part_of_band(start, at, start.band.z, 1.0 - below, 6u);
             lives = true;
