@@ -20,7 +20,7 @@ import numpy as np
 from .camera_coat import base_reflectance, coat_albedo, coat_lobe, reflected_by_coat, under_coat
 from .camera_lights import draw_by_cosine, draw_direction, light_seen, sample_light
 from .camera_scene import beyond
-from .compiling import compiled, inlined
+from .compiling import FIRST, NO, NONE, compiled, inlined
 from .photon_emit import search
 from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
@@ -266,7 +266,7 @@ def sample(scene, lights, spectra, pictures, tables, start, ray, noise, max_dept
     """
     place, d = ray
     state, shift, xyz = scratch.state, scratch.shift, scratch.xyz
-    last, within, mask, alone, events = -1, False, start.mask, start.alone, 0
+    last, within, mask, alone, events = NONE, NO, start.mask, start.alone, FIRST
     atom, nm, found, weight, surfaces = -1, 0.0, 0.0, 1.0, 0
     if mask != np.uint64(0) or alone != AIR:  # in glass wavelengths part at once
         atom, nm = _wavelength(spectra, unit(state[2] ^ shift[2]))
@@ -421,7 +421,7 @@ def seen_points(scene, camera, start, sequence, count, nm, max_depth, bounces, s
             sobol_next(sequence, i, state)
         noise = mixed(sequence.key ^ mixed(np.uint64(i)))
         place, d = _start_ray(camera, unit(state[0]) * camera.width, unit(state[1]) * camera.height, noise)
-        last, within, mask, alone, events, way, surfaces = -1, False, start.mask, start.alone, 0, 0.0, 0
+        last, within, mask, alone, events, way, surfaces = NONE, NO, start.mask, start.alone, FIRST, 0.0, FIRST
         if scene.polarised:
             begin_light(scene, scratch.field, d, mask, alone, nm, _of_coat(noise, -1, 0))
         while events <= max_depth:

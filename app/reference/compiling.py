@@ -6,9 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..base import compiling
 
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "_nrt": False}
+NONE, FIRST, NO = np.int64(-1), np.int64(0), np.bool_(False)
+"""What a loop begins with. Of a literal numba would compile all that is called with it once more for that literal."""
 _VERSION = compiling.version_of(path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py")))
 
 
@@ -22,5 +26,5 @@ def compiled(function: Callable, **more: Any) -> Callable:
 
 
 def inlined(function: Callable) -> Callable:
-    """`compiled`, and inlined into its callers: arrays are not passed at every call."""
-    return compiled(function, forceinline=True)
+    """`compiled` for compiled functions alone, and inlined into them: arrays are not passed at every call."""
+    return compiled(function, forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)

@@ -14,7 +14,7 @@ import numpy as np
 from ..model.scene import Scene
 from .camera_kernel import gain_of_light
 from .camera_lights import CameraLights, camera_lights
-from .compiling import compiled
+from .compiling import NO, NONE, compiled
 from .photon_intersect import nearest, normal_at
 from .photon_scene import MIRROR, PhotonScene, photon_scene
 from .sampling import scratch
@@ -55,7 +55,7 @@ class DirectLight(NamedTuple):
 @compiled
 def _gather(scene, lights, start, normal, height, found, scratch):
     """Set `found` (L,) to means over places on the lights."""
-    distance, triangle, _, _ = nearest(scene, start, negated(normal), -1, False, np.uint64(0), scratch)
+    distance, triangle, _, _ = nearest(scene, start, negated(normal), NONE, NO, np.uint64(0), scratch)
     if triangle < 0 or distance > 100.0 * height:
         return
     place = moved(start, distance, negated(normal))
@@ -90,5 +90,5 @@ def _specular(scene, camera, offset, hit, scratch):
     for row in range(hit.shape[0]):
         for column in range(hit.shape[1]):
             place, d = camera_ray(camera, column + offset, row + offset)
-            _, triangle, _, _ = nearest(scene, place, d, -1, False, np.uint64(0), scratch)
+            _, triangle, _, _ = nearest(scene, place, d, NONE, NO, np.uint64(0), scratch)
             hit[row, column] = triangle >= 0 and scene.kind[scene.owner[triangle]] >= MIRROR

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from .compiling import compiled, inlined
+from .compiling import FIRST, NO, NONE, compiled, inlined
 from .photon_emit import emit_coloured
 from .photon_intersect import blocked, nearest, normal_at
 from .photon_scene import BLACK, DIFFUSE
@@ -40,7 +40,7 @@ def _follow(scene, place, d, nm, watt, noise, dimension, by_event, max_depth, ta
     """
     if scene.polarised:
         begin_unpolarised(scratch.field, d)
-    last, within, mask, alone, depth = -1, False, np.uint64(0), AIR, 0
+    last, within, mask, alone, depth = NONE, NO, np.uint64(0), AIR, FIRST
     while True:
         t, triangle, u, v = nearest(scene, place, d, last, within, mask, scratch)
         if triangle < 0:

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from .compiling import compiled, inlined
+from .compiling import NONE, compiled, inlined
 from .crystals import begin_in_crystal, solve_interface, take_wave, through_sheet
 from .curved_surfaces import turned_normal
 from .gratings import diffracted, order_share
@@ -25,7 +25,7 @@ from .sampling import mixed, word_number
 from .thin_films import film_amplitudes, film_nm
 from .vectors import across, combined, cross, dot, length, mixed_of, moved, negated, over
 
-AIR = -1
+AIR = NONE
 _TABLE_SCALE = 20.0
 _TABLE_LAST = 8000
 

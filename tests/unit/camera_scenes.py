@@ -12,11 +12,25 @@ from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb709_to_xyz
 from spectrasplat.model.optics.glass import Dispersion, from_abbe
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Black, Camera, Dielectric, Diffuse, Light, Material, Scene, SceneObject
+from spectrasplat.reference import photon_intersect, scattering
+from spectrasplat.reference.compiling import compiled
 
 FLINT = from_abbe(1.7, 25.0)
 D65 = illuminant("D65").scaled_to_luminous(1.0)
 ABOVE = Camera((0.0, 0.0, 9.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), kind="orthographic", vertical_extent=1.0)
 WHITE = rgb709_to_xyz(np.ones(3))
+
+
+@compiled
+def scatter(*event):
+    """`scattering.scatter`, which only compiled functions may call."""
+    return scattering.scatter(*event)
+
+
+@compiled
+def normal_at(*there):
+    """`photon_intersect.normal_at`, which only compiled functions may call."""
+    return photon_intersect.normal_at(*there)
 
 
 def place(mesh, material: Material, at=(0.0, 0.0, 0.0), rotation: np.ndarray | None = None) -> SceneObject:

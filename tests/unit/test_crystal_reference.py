@@ -18,7 +18,9 @@ from spectrasplat.reference.photon_intersect import nearest
 from spectrasplat.reference.photon_scene import photon_scene
 from spectrasplat.reference.polarised import amplitudes, begin_unpolarised, senkrecht, share_of
 from spectrasplat.reference.sampling import scratch
-from spectrasplat.reference.scattering import AIR, scatter
+from spectrasplat.reference.scattering import AIR
+
+from tests.unit.camera_scenes import scatter
 
 UP = np.array([0.0, 0.0, 1.0])
 NM = 589.3
@@ -131,81 +133,6 @@ def test_equal_indices_are_fresnels(n: float, degrees: float) -> None:
         assert shares.sum() == pytest.approx(1.0, abs=1e-12)
 
 
-def test_calcite_walks_off_by_6_degrees() -> None:
-    """Through the face of a cleavage rhomb, 44.61° from the axis, light that is not deviated and light that goes
-    6.2° off: tan ρ = (n_o² − n_e²) tan θ / (n_e² + n_o² tan²θ)."""
-    theta = math.radians(44.61)
-    spar = crystal([math.sin(theta), 0.0, math.cos(theta)])
-    ordinary, other = Light(-UP), Light(-UP)
-    n = [N_O, 1.0 / math.hypot(math.cos(theta) / N_O, math.sin(theta) / N_E)]
-    wanted = sum(2.0 * each / (1.0 + each) ** 2 for each in n)
-    assert ordinary.meets(UP, spar, 2) + other.meets(UP, spar, 3) == pytest.approx(wanted, abs=1e-12)
-    np.testing.assert_allclose(ordinary.direction, -UP, atol=1e-12)
-    walk_off = math.degrees(math.acos(-other.direction[2]))
-    tangent = (N_O**2 - N_E**2) * math.tan(theta) / (N_E**2 + N_O**2 * math.tan(theta) ** 2)
-    assert walk_off == pytest.approx(math.degrees(math.atan(tangent)), abs=1e-9)
-    assert walk_off == pytest.approx(6.2, abs=0.05)
-    # It leaves the other face as it came.
-    other.meets(UP, VACUUM, 2)
-    np.testing.assert_allclose(other.direction, -UP, atol=1e-12)
-
-
-def test_light_along_the_axis_stays_together() -> None:
-    for wave in (2, 3):
-        light = Light(-UP)
-        light.meets(UP, crystal(UP), wave)
-        np.testing.assert_allclose(light.direction, -UP, atol=1e-9)
-
-
-def test_brewsters_angle_of_each_wave() -> None:
-    """The axis across the plane of incidence: p is ordinary, and s is extraordinary."""
-    spar = crystal([0.0, 1.0, 0.0])
-    angle = math.atan(N_O)
-    way = [math.sin(angle), 0.0, -math.cos(angle)]
-    p, s = Light(way).polarised_along([math.cos(angle), 0.0, math.sin(angle)]), Light(way).polarised_along([0, 1, 0])
-    assert p.shares(UP, spar)[:2].sum() < 1e-12
-    cosine_t = math.sqrt(1.0 - (math.sin(angle) / N_E) ** 2)
-    wanted = ((math.cos(angle) - N_E * cosine_t) / (math.cos(angle) + N_E * cosine_t)) ** 2
-    np.testing.assert_allclose(s.shares(UP, spar), [wanted, 0.0, 0.0, 1.0 - wanted], atol=1e-12)
-
-
-def test_a_glan_prism_reflects_the_ordinary_ray_alone() -> None:
-    """An air gap at 38.5° (Glan and Foucault): between the critical angles of both indices; [Hecht, 8.4]."""
-    spar, angle = crystal([0.0, 1.0, 0.0]), math.radians(38.5)
-    normal = -np.array([math.sin(angle), 0.0, math.cos(angle)])
-    assert math.asin(1.0 / N_O) < angle < math.asin(1.0 / N_E)
-    gone = [Light(UP, spar, kind).shares(normal, VACUUM)[2:].sum() for kind in (False, True)]
-    assert abs(gone[0]) < 1e-12 and gone[1] > 0.5
-
-
-@pytest.mark.parametrize("degrees", [15.0, 30.0, 45.0])
-def test_wollaston_and_rochon(degrees: float) -> None:
-    """Two wedges of calcite, cut at an angle. Wollaston: axes across each other and the light; what was ordinary
-    becomes extraordinary, and both rays are deviated. Rochon: the first axis along the light; the ordinary ray goes
-    straight."""
-    angle = math.radians(degrees)
-    cut = np.array([math.sin(angle), 0.0, math.cos(angle)])
-
-    def leaves(first: Medium, waves: tuple[int, int]) -> tuple[float, float]:
-        light = Light(-UP).polarised_along([0.0, 1.0, 0.0] if waves[1] == 3 else [1.0, 0.0, 0.0])
-        light.meets(UP, first, waves[0])
-        share = light.meets(cut, crystal([0.0, 1.0, 0.0]), waves[1])
-        light.meets(UP, VACUUM, 2)
-        return share, math.degrees(math.asin(light.direction[0]))
-
-    def wanted(n_1: float, n_2: float) -> float:
-        inside = math.asin(n_1 * math.sin(angle) / n_2) - angle
-        return math.degrees(math.asin(n_2 * math.sin(inside)))
-
-    wollaston = leaves(crystal([1.0, 0.0, 0.0]), (3, 2)), leaves(crystal([1.0, 0.0, 0.0]), (2, 3))
-    assert wollaston[0][1] == pytest.approx(wanted(N_E, N_O), abs=1e-9)
-    assert wollaston[1][1] == pytest.approx(wanted(N_O, N_E), abs=1e-9)
-    straight, turned = leaves(crystal(UP), (2, 2)), leaves(crystal(UP), (2, 3))
-    assert straight[1] == pytest.approx(0.0, abs=1e-6)
-    assert turned[1] == pytest.approx(wanted(N_O, N_E), abs=1e-6)
-    assert min(share for share, _ in (*wollaston, turned)) > 0.9
-
-
 def test_malus_and_wave_plates() -> None:
     """Half of unpolarised light passes a polariser, cos² of that another one; between crossed ones a plate lets
     sin² 2φ sin² δ/2 through, and a quarter-wave plate at 45° makes light circular."""
@@ -272,17 +199,6 @@ def placed(name: str, z: float) -> np.ndarray:
 
 
 FLOOR = SceneObject("floor", plane(50.0, 50.0), Black(), placed("floor", -3.0))
-
-
-def test_a_plate_makes_two_spots() -> None:
-    """As far apart as walk-off times the thickness, of equal power, and the turned one in the plane of the axis."""
-    theta = math.radians(44.61)
-    rhomb = spar([0.0, math.sin(theta), math.cos(theta)])
-    found = lands(scene_of(SceneObject("spar", box((2.0, 2.0, 1.0)), rhomb), FLOOR), (0.1, 0.2, 3.0), 1500)
-    first, second = sorted(found.items(), key=lambda each: -each[1])[:2]
-    apart = np.subtract(first[0], second[0])
-    assert abs(apart[0]) < 1e-6 and abs(apart[1]) == pytest.approx(math.tan(math.radians(6.22)), abs=5e-4)
-    assert first[1] == pytest.approx(0.45, abs=0.03) and second[1] == pytest.approx(0.45, abs=0.03)
 
 
 def test_crossed_polarisers_are_dark_and_a_third_brings_light() -> None:

@@ -22,12 +22,14 @@ from spectrasplat.model.scene_objects import make_shape
 from spectrasplat.model.texture import Texture
 from spectrasplat.reference import photon_reference
 from spectrasplat.reference.direct_light import seen_directly
-from spectrasplat.reference.photon_intersect import blocked, nearest, normal_at
+from spectrasplat.reference.photon_intersect import blocked, nearest
 from spectrasplat.reference.photon_reference import reference_key, render_reference
 from spectrasplat.reference.photon_scene import PhotonScene, photon_scene
 from spectrasplat.reference.sampling import scratch
-from spectrasplat.reference.scattering import AIR, scatter
+from spectrasplat.reference.scattering import AIR
 from spectrasplat.reference.scene_surfaces import FORM_SIZE, TURNS, as_triangles, pieces
+
+from tests.unit.camera_scenes import normal_at, scatter
 
 CROWN = 1.5168
 WHITE = Diffuse((0.8, 0.8, 0.8))
@@ -203,19 +205,6 @@ def test_ball_lens(height: float, expected: float) -> None:
     assert abs(crossing_of_axis(triangles, height) - expected) > 1e-3
 
 
-def test_plano_convex_lens_is_paraxial_near_its_axis() -> None:
-    """T5: a curved face behind has its focus R/(n − 1) behind its vertex."""
-    lens = solid("lens", radius1=math.inf, radius2=-1.0, thickness=0.2, diameter=0.8)
-    assert crossing_of_axis(lens, 1e-4) == pytest.approx(0.1 + 1.0 / (CROWN - 1.0), abs=1e-6)
-
-
-def test_conic_cap_is_free_of_spherical_aberration() -> None:
-    """A hyperbola, k = −n², behind a plane face sends all rays to one point, R/(n − 1) behind its vertex."""
-    lens = solid("lens", radius1=math.inf, radius2=-1.0, thickness=0.6, diameter=1.4, conic2=-(CROWN**2))
-    found = [crossing_of_axis(lens, height) for height in (0.05, 0.3, 0.65)]
-    np.testing.assert_allclose(found, 0.3 + 1.0 / (CROWN - 1.0), atol=1e-11)
-
-
 def test_ellipsoid_focuses_perfectly() -> None:
     """T7: with eccentricity 1/n rays along the axis meet in the far focus; a sphere cut through it lets them out."""
     b = math.sqrt(1.0 - 1.0 / CROWN**2)
@@ -232,23 +221,6 @@ def test_ellipsoid_focuses_perfectly() -> None:
         )
         place = place + centre
         assert place[2] - z * place[0] / x == pytest.approx(1.0 / CROWN, abs=1e-12) and abs(y) < 1e-15
-
-
-def test_stretched_ball_is_an_ellipsoid() -> None:
-    """The placement's scale counts as semi-axes do."""
-    stretched = SceneObject(
-        "solid", make_shape("sphere", radius=1.0, triangles=200), GLASS, np.diag([0.6, 0.6, 1.3, 1.0])
-    )
-    plain = solid("ellipsoid", semi_axes=[0.6, 0.6, 1.3])
-    assert crossing_of_axis(stretched, 0.4) == pytest.approx(crossing_of_axis(plain, 0.4), abs=1e-13)
-
-
-def test_rod_bends_as_a_ball_does_across_its_axis() -> None:
-    """T4 once more, in the plane across a cylinder."""
-    profile = [[0.0, -1.0], [1.0, -1.0], [1.0, 1.0], [0.0, 1.0]]
-    mesh = make_shape("revolution", profile=profile, segments=12, crease_deg=30.0)
-    lying = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], float)
-    assert crossing_of_axis(SceneObject("rod", mesh, GLASS, lying), 0.5) == pytest.approx(1.363890, abs=1e-6)
 
 
 def test_normals_of_a_smooth_profile_turn_as_the_mesh_s_do() -> None:
