@@ -198,7 +198,7 @@ class Start(NamedTuple):
 def camera_start(scene: Scene, photons: PhotonScene) -> Start:
     """The medium at the camera's position (of an orthographic camera too: its rays all begin as the middle one
     does)."""
-    mask, alone = 0, AIR
+    mask, alone = 0, int(AIR)
     for index, item in enumerate(scene.objects):
         if item.material.is_solid and contains(item, np.array(scene.camera.position)):
             if photons.bit[index] >= 0:

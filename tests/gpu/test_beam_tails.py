@@ -168,19 +168,6 @@ def test_more_facets_ahead_than_a_flight_keeps(gl) -> None:
         assert held(by_beams) == pytest.approx(1.0, abs=0.04)
 
 
-@pytest.mark.slow
-def test_a_stone_is_less_noisy_than_by_photons(gl, tmp_path: Path) -> None:
-    scene, noise = stone(tmp_path), {}
-    for method in ("srd", "srd-photons"):
-        pictures = []
-        for seed in (1, 2):
-            with passed(gl, scene, method, seed) as light:
-                pictures.append(coarse(light))
-        noise[method] = np.sqrt(np.sum((pictures[0] - pictures[1]) ** 2) / np.sum(pictures[0] ** 2))
-    print(noise)
-    assert noise["srd"] < 0.6 * noise["srd-photons"]
-
-
 def test_lines_are_carried_on_one_by_one(gl, tmp_path: Path) -> None:
     """Two lines throw what each throws alone."""
     scene, each = stone(tmp_path, spectrum=LINES), []

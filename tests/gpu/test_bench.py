@@ -13,7 +13,7 @@ from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.bench import runner, splat_speed
 from spectrasplat.bench.measured_passes import LIGHT
-from spectrasplat.bench.rendering import KERNELS, MethodRig
+from spectrasplat.bench.rendering import MethodRig
 from spectrasplat.bench.results import BenchResult, Trial
 from spectrasplat.bench.tuning import Tuning
 from spectrasplat.commands.scenes import find_scene
@@ -62,23 +62,6 @@ def test_a_rig_renders_what_render_does_again_and_again(gl: Any, prism: Scene) -
     assert 0.5 * 3000 < first.emitted < 2 * 3000 and other.emitted < first.emitted and first.splats > 0
     assert set(rig.setup_seconds) == {"buffers", "compile", "pilot", "first run"} and rig.buffers_mib > 1.0
     assert budgets == sorted(set(budgets)) and 1 <= len(budgets) <= 4 and budgets[-1] >= 64
-
-
-@pytest.mark.slow
-def test_a_baseline_is_rendered_with_any_kernel(gl: Any, prism: Scene) -> None:
-    """What a kernel blurs is gone with the next rendering, and only methods with a kernel to choose have any."""
-    rig = MethodRig(gl, prism, "stochastic", WIDTH, HEIGHT)
-    try:
-        assert rig.kernels == KERNELS and rig.kernels[0] == pytest.approx(0.45) and rig.kernels[-1] == pytest.approx(32)
-        narrow, wide, again = (rig.render(3000, 5, kernel).xyz[..., 1] for kernel in (None, 8.0, None))
-    finally:
-        rig.release()
-    assert np.allclose(again, narrow, rtol=1e-5, atol=1e-6 * narrow.max())
-    assert (wide**2).mean() < 0.95 * (narrow**2).mean()
-    for method in ("srd", "stochastic-point"):
-        rig = MethodRig(gl, prism, method, WIDTH, HEIGHT)
-        rig.release()
-        assert rig.kernels == ()
 
 
 def test_a_rig_renders_all_passes_of_a_method_that_has_several(gl: Any, prism: Scene) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
-import numpy as np
 import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.bench import camera_rendering, runner, subjects
@@ -17,11 +16,8 @@ from spectrasplat.bench.rendering import NothingToMeasure
 from spectrasplat.bench.results import BenchResult
 from spectrasplat.commands.scenes import find_scene
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.optics.colorimetry import rgb709_to_xyz
 from spectrasplat.model.scene import Scene
-from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.spectral_caustic import CausticPlan
-from spectrasplat.render.still import render
 
 WIDTH, HEIGHT = 48, 27
 PHOTONS = 1 << 14
@@ -33,44 +29,6 @@ pytestmark = pytest.mark.usefixtures("commands_share_context")
 def ball() -> Scene:
     """A flint ball before its caustic, with few triangles."""
     return load_scene(find_scene("ball_caustic"))
-
-
-@pytest.mark.slow
-def test_a_rig_looks_as_render_does_again_and_again(gl: Any, ball: Scene) -> None:
-    told: list[str] = []
-    light = SharedLight(gl, ball, WIDTH, HEIGHT, told.append, PHOTONS)
-    rigs = {method: CameraRig(gl, ball, method, WIDTH, HEIGHT, light) for method in ("stochastic", "srd", "regular-7")}
-    try:
-        first = {method: rig.render(16, 1) for method, rig in rigs.items()}
-        other, again = rigs["stochastic"].render(3, 2), rigs["stochastic"].render(16, 1)
-        budgets = rigs["regular-7"].budgets(0.05, 4)
-        fitting = rigs["regular-7"].fitting(20)
-    finally:
-        for owned in (*rigs.values(), light):
-            owned.release()
-    for method in ("stochastic", "srd"):
-        settings = RenderSettings(
-            width=WIDTH,
-            height=HEIGHT,
-            photons=PHOTONS,
-            seed=1,
-            camera_method=method,
-            spp=16,
-            max_depth=ball.render.max_depth,
-        )
-        picture = rgb709_to_xyz(render(ball, settings, context=gl).rgb.astype(float))
-        assert np.allclose(first[method].xyz, picture, rtol=1e-3, atol=1e-4 * picture.max()), method
-    assert np.allclose(
-        again.xyz, first["stochastic"].xyz, rtol=1e-5, atol=1e-6 * again.xyz.max()
-    )  # nothing is left of the picture between
-    assert not np.allclose(other.xyz, again.xyz, rtol=0.05, atol=1e-3 * again.xyz.max())
-    assert {method: r.emitted for method, r in first.items()} == {"stochastic": 16, "srd": 16, "regular-7": 21}
-    assert fitting == 14 and budgets and all(n % 7 == 0 for n in budgets)
-    assert (
-        all(set(r.seconds) == {"bands", "lookups"} and r.seconds["lookups"] > 0.0 for r in first.values())
-        and light.seconds > 0.0
-        and told
-    )
 
 
 def test_where_nothing_disperses_there_is_nothing_to_measure(gl: Any) -> None:

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.base.image_io import Picture, channel_name, read_image
-from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, xyz_to_rgb709
 
 Render = Callable[..., Picture]
@@ -300,16 +299,3 @@ def test_instances_each_cast_a_caustic(render: Render) -> None:
     left, right = np.split(pictures[1], 2, axis=1)
     assert left.sum() == pytest.approx(right.sum(), rel=0.05)
     assert pictures[1].sum() == pytest.approx(2.0 * pictures[0].sum(), rel=0.05)
-
-
-def test_a_glb_is_opened_as_a_scene(render: Render) -> None:
-    picture = render(assets_dir() / "meshes" / "gems.glb", "--layer caustic --stats")
-    assert luminance(picture).sum() > 0.0 and abs(share(render, "unaccounted")) <= 0.03
-
-
-def test_three_lines_are_a_scene(render: Render) -> None:
-    picture = render('[[objects]]\nshape = "sphere"\nglass = "N-SF11"\n', "--layer caustic --stats")
-    assert render.notes.count("note: ") == 2  # type: ignore[attr-defined]
-    bright = luminance(picture)
-    assert bright.max() > 5.0 * bright.mean()  # the heart of the ball's caustic is in view
-    assert share(render, "deposited") > 0.3

@@ -120,24 +120,6 @@ def test_the_reference_agrees_with_the_picture_and_stops_when_the_scene_changes(
     assert not comparison.is_stale and comparison.picture is None and comparison.is_busy
 
 
-@pytest.mark.slow
-def test_another_method_runs_beside_in_its_own_engine(
-    gl, state: State, running: LiveEngine, comparison: Comparison
-) -> None:
-    compared = replace(state, compare=Compare(mode="hold", method="stochastic-even"))
-    until(
-        lambda: (comparison.progress or 0.0) > 0.05 and comparison.picture is not None,
-        lambda: comparison.advance(compared, running, 0.05),
-    )
-    live, other = read(running.picture), read(comparison.picture)
-    assert other.shape == live.shape and not np.array_equal(other, live)
-    assert other.sum() == pytest.approx(live.sum(), rel=0.1)
-    assert "Even random wavelengths" in comparison.text
-    rays = running.stats.rays_traced
-    comparison.advance(replace(state, compare=Compare()), running, 0.05)
-    assert comparison.picture is None and running.stats.rays_traced == rays and not comparison.is_busy
-
-
 def test_without_a_reference_a_sentence_says_why(state, running, comparison, monkeypatch) -> None:
     thread = idle_thread(problem="the camera has a lens")
     monkeypatch.setattr("spectrasplat.ui.compare.ReferenceThread", lambda *_more: thread)

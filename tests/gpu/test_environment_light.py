@@ -199,42 +199,6 @@ def test_no_halo_is_about_what_stands_on_a_wide_floor_or_just_above(gl: Context,
     assert abs((shown[beside] - expected)[-size // 4 :].mean()) < 4e-3  # no window's border shows
 
 
-@pytest.mark.slow
-def test_the_viewer_keeps_it_where_only_the_camera_moves(gl: Context) -> None:
-    scene = scene_of(place(sphere(0.4, 320), Diffuse((0.5, 0.5, 0.5)), (0.0, 0.0, 0.5)), floor(), environment=SKY)
-    engine = LiveEngine(gl)
-    engine.target_photons, engine.camera_samples = 1000, 2
-
-    def shown(scene: Scene, camera: Camera) -> tuple[object, int, np.ndarray]:
-        engine.set(LiveInputs(scene, camera, 48, 32))
-        until = time.monotonic() + 60.0
-        while not engine.is_idle and time.monotonic() < until:
-            engine.advance(0.05)
-        assert engine.is_idle and engine.problem is None and engine._shown is not None
-        light = engine._shown.light.environment
-        picture = np.frombuffer(engine.picture.read(), "f4").reshape(engine.picture.height, -1, 4)
-        return light, (light.asked if light is not None else 0), picture[..., :3]
-
-    try:
-        first, done, _ = shown(scene, CAMERA)
-        assert first is not None and done == first.total
-        asked_before = first.seconds
-        moved, _, _ = shown(scene, replace(CAMERA, position=(1.0, -4.0, 2.0)))
-        assert moved is first and first.seconds == asked_before
-        # Another environment is asked for anew, of the same places; another place of a thing needs others.
-        red = gradient((1.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
-        again, _, seen = shown(replace(scene, environment=red), CAMERA)
-        assert again is first and first.seconds > asked_before
-        assert seen[..., 0].min() > 0.05 and abs(seen[..., 1:]).max() < 1e-3
-        matrix = np.eye(4)
-        matrix[:3, 3] = 0.5, 0.0, 0.5
-        aside = replace(scene, objects=(replace(scene.objects[0], object_to_world=matrix), scene.objects[1]))
-        assert shown(aside, CAMERA)[0] is not first
-        assert shown(replace(scene, environment=replace(SKY, lights=False)), CAMERA)[0] is None
-    finally:
-        engine.release()
-
-
 @pytest.mark.parametrize("hurries", ["is_becoming_whole", "is_paused"])
 def test_the_rest_of_it_waits_for_a_picture_that_becomes_whole(
     gl: Context, monkeypatch: pytest.MonkeyPatch, hurries: str

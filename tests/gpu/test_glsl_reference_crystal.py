@@ -210,17 +210,3 @@ def test_columns_are_derivatives(gl) -> None:
         off.append(np.abs(got["dturned"][i] - difference).max() / (1.0 + np.abs(difference).max()))
     assert np.median(off) < 1e-5
     assert np.quantile(off, 0.98) < 1e-3
-
-
-def test_calcite_walks_off(gl) -> None:
-    """6.2° at 45° to the axis, upright into a cleavage rhomb; the ordinary wave goes straight on."""
-    angle = np.radians(np.array([44.61, 45.0, 0.0, 90.0]))
-    axis = np.stack([np.sin(angle), 0.0 * angle, np.cos(angle)], axis=1)
-    body = """
-        Uniaxial crystal = Uniaxial(axis, vec2(1.6584, 1.4864));
-        float part = forward_part(crystal, false, vec3(0.0, 0.0, 1.0), 1.0, vec3(0.0, 0.0, 1.0)).x;
-        vec3 ray = normalize(energy_of_wave(crystal, vec3(0.0, 0.0, part)));
-        off = degrees(acos(min(ray.z, 1.0)));
-    """
-    off = evaluate(gl.ctx, LIBRARY, body, {"axis": axis}, {"off": "float"})["off"]
-    np.testing.assert_allclose(off, [6.224, 6.224, 0.0, 0.0], atol=0.03)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from reference.grating import diffract
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.model.geometry.mesh import Mesh
-from spectrasplat.model.geometry.primitives import box, plane
+from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.optics import catalogue
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.glass import constant
@@ -27,7 +26,6 @@ from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.gpu_paths import Photons, placed, screen, trace_beam
 
 from tests.gpu.camera_rig import white_through
-from tests.gpu.test_live_light import difference, edited, inputs, into, live, maps, shipped, splat_again, trace
 
 MERCURY_NM = (404.66, 435.83, 546.07, 576.96, 579.07)
 COUNT = 4096
@@ -297,33 +295,6 @@ def test_all_orders_of_white_are_white(gl: Context) -> None:
     assert np.abs(picture - 0.9).max() < 1e-5
 
 
-def behind_a_prism() -> Scene:
-    """The shipped prism, and a grating in its fan of colours."""
-    scene = shipped("prism")
-    upright = np.array([[0.0, 0.0, 1.0, 1.3], [1.0, 0.0, 0.0, -0.3], [0.0, 1.0, 0.0, 0.62], [0.0, 0.0, 0.0, 1.0]])
-    grating = SceneObject("grating", plane(4.0, 1.2), Grating(300.0, (-1, 0, 1), (0.2, 0.4, 0.2)), upright)
-    return replace(scene, objects=(*scene.objects, grating))
-
-
-@pytest.mark.slow
-def test_an_edit_of_glass_before_a_grating_is_followed(gl: Context) -> None:
-    """Photons carry a column by n and one by λ; what the edit moves is where a fresh trace puts it."""
-    scene = behind_a_prism()
-    with live(gl, scene) as light:
-        trace(light)
-        before, other = maps(light), edited(scene, 1.05)
-        shown = splat_again(light, inputs(other))
-        with live(gl, other) as fresh:
-            trace(fresh)
-            want = into(light, fresh)
-
-    def blurred(texels: np.ndarray) -> np.ndarray:
-        height, width = (n // 8 * 8 for n in texels.shape[:2])
-        return texels[:height, :width].reshape(height // 8, 8, width // 8, 8, 4).mean(axis=(1, 3))
-
-    assert difference(blurred(shown), blurred(want)) < 0.35 * difference(blurred(before), blurred(want))
-
-
 def test_picking_follows_the_strongest_order(gl: Context) -> None:
     """Each wavelength of a single ray goes where that order goes."""
     grating = Grating(600.0, (-1, 0, 1), (0.2, 0.3, 0.4))
@@ -340,15 +311,3 @@ def test_picking_follows_the_strongest_order(gl: Context) -> None:
         buffers.release()
     ends = np.array([path.points[-1] for path in found])
     assert np.abs(ends[:, 0] - 0.01 - np.tan(np.arcsin(nm * 6e-4))).max() < 2e-6
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("count", "lines"), [(3, 20.0), (11, 20.0), (51, 10.0)])
-def test_two_gratings_of_many_orders_keep_white(gl: Context, count: int, lines: float) -> None:
-    """What a sample cannot follow any more still stands for the light that is left, no more and no less."""
-    camera = Camera((0, 0, 2), (0.2, 0, 0), (0, 1, 0), vertical_fov_deg=30.0)
-    grating = Grating(lines, tuple(range(-(count // 2), count // 2 + 1)), (0.9 / count,) * count)
-    beyond = placed("second", screen(np.array([0.0, 0.0, -0.3]), np.array([0.0, 0.0, 1.0]), 8.0), grating)
-    scene = white_furnace(sheet(grating, 6.0), beyond, camera=camera)
-    picture = render(scene, RenderSettings(width=24, height=16, spp=32), context=gl).rgb
-    assert np.abs(picture - 0.81).max() < 1e-5

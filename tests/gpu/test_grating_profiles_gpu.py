@@ -14,19 +14,13 @@ from spectrasplat.model.geometry.primitives import plane
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.scene import Camera, Grating
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.camera_reference import cached_camera_reference
-from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.camera_probe import white_furnace
 
 from tests.gpu.camera_rig import white_through
 from tests.gpu.test_grating_gpu import sheet, shone
 from tests.statistical.test_grating_against_references import (
-    SETTINGS,
-    error,
     placed,
-    slit_seen_through,
-    spectra_on_a_wall,
 )
 
 KINDS = {
@@ -93,27 +87,3 @@ def test_energy_of_white_light_through_two_blazed_gratings(gl: Context) -> None:
         tally = found.tally
         assert sum(tally.ended.values()) == pytest.approx(tally.emitted, rel=1e-4)
         assert 0.0 < tally.ended["absorbed"] < 0.6 * tally.emitted
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", list(KINDS))
-def test_light_lands_as_in_the_reference(kind: str) -> None:
-    scene = spectra_on_a_wall(reflects=kind == "mirror")
-    made = grating(kind, 600.0, (-1, 0, 1, 2))
-    scene = replace(scene, objects=(replace(scene.objects[0], material=made), *scene.objects[1:]))
-    reference = cached_reference(scene, 96, 48, photons=400_000).rgb
-    picture = render(scene, replace(SETTINGS, layer="caustic")).rgb
-    assert picture.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.02)
-    assert error(picture, reference) < 0.05
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", ["blazed", "lamellar"])
-def test_the_camera_sees_a_slit_as_the_reference_does(kind: str) -> None:
-    scene = slit_seen_through()
-    made = grating(kind, 600.0, (-1, 0, 1))
-    scene = replace(scene, objects=(replace(scene.objects[0], material=made), *scene.objects[1:]))
-    reference = cached_camera_reference(scene, 96, 48, samples=1500).rgb
-    picture = render(scene, SETTINGS).rgb
-    assert picture.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.02)
-    assert error(picture, reference) < 0.04

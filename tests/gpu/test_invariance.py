@@ -344,24 +344,3 @@ def test_resolution_of_a_map_does_not_change_what_it_holds(gl) -> None:
     )
     # Measured: 0.003 (0.009 with 24 texels, 0.002 with 96).
     np.testing.assert_allclose(fine, coarse, rtol=5e-3)
-
-
-@pytest.mark.slow
-def test_seeds_differ_and_their_means_agree(gl) -> None:
-    """Two sets of eight seeds: the difference of each block of pixels, and of the sum, in standard errors. Sums that
-    differ by 2 % would be seen with probability 0.99."""
-    # Random wavelengths leave 0.5 % in a seed's sum at 128,000 photons, as independent draws do; 2 % at 8,000, which is
-    # too much.
-    settings = {"photons": 200_000, "layer": "caustic", "method": "stochastic"}
-    seeds = np.array([picture(gl, scene(), seed=seed, **settings) for seed in range(16)])
-    assert not np.array_equal(seeds[0], seeds[1])
-    blocks = seeds[:, :, :, 1].reshape(16, 6, 6, 8, 8).sum(axis=(2, 4))
-    first, second = blocks[:8], blocks[8:]
-    error = np.sqrt((first.var(axis=0, ddof=1) + second.var(axis=0, ddof=1)) / 8)
-    lit_blocks = blocks.mean(axis=0) > 0.05 * blocks.mean(axis=0).max()
-    t = np.abs(first.mean(axis=0) - second.mean(axis=0))[lit_blocks] / error[lit_blocks]
-    assert t.max() < 7.0  # Student's t of 14 degrees over some tens of blocks: 1e-4
-    sums = seeds.sum(axis=(1, 2, 3))
-    spread = sums.std(ddof=1) / np.sqrt(8)
-    assert (5.0 + 2.33) * np.sqrt(2.0) * spread < 0.02 * sums.mean()
-    assert abs(sums[:8].mean() - sums[8:].mean()) < 5.0 * np.sqrt(2.0) * spread

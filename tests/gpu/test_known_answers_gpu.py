@@ -1,6 +1,5 @@
 """The known answers T1 to T16 by all that walks rays on the device: photons of the real emit and trace shaders, and the
-single rays of queries. T3 by camera pictures is in `test_camera_known_answers.py`, all by float64 in
-`tests/unit/test_known_answers.py`.
+single rays of queries. T3 by camera pictures is in `test_camera_known_answers.py`.
 
 Float32: 1e-4 relative, mostly much better. Facets of curved shapes leave an error of second order in their width
 (`test_tessellation_gpu.py` shows the order): tolerances are that of the meshes used here where it is larger.

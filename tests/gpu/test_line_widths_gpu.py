@@ -6,8 +6,6 @@ peak."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from spectrasplat.gpu.context import Context
@@ -15,15 +13,12 @@ from spectrasplat.model.materials import Slit
 from spectrasplat.model.optics.gratings import line_quantiles
 from spectrasplat.model.scene import Camera, Grating
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.reference.camera_reference import cached_camera_reference
-from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.camera_probe import white_furnace
 from spectrasplat.stress.rigs.gpu_paths import placed as placed_at
 from spectrasplat.stress.rigs.gpu_paths import screen, trace_beam
 
 from tests.gpu.test_grating_gpu import sheet
-from tests.statistical.test_grating_against_references import SETTINGS, error, slit_seen_through, spectra_on_a_wall
 
 COUNT = 20_000
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -130,20 +125,3 @@ def test_white_all_round_stays_white_behind_a_slit(gl: Context) -> None:
     scene = white_furnace(placed_at("slit", screen(np.zeros(3), -DOWN, 3.0), Slit(width_um=40.0)), camera=camera)
     picture = render(scene, RenderSettings(width=24, height=16, spp=64), context=gl).rgb
     assert np.abs(picture.mean(axis=(0, 1)) - 1.0).max() < 4e-3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("material", [Grating(600.0, (-1, 0, 1), (0.3, 0.2, 0.4), grooves=25.0), Slit(width_um=8.0)])
-def test_against_both_references(material: Grating) -> None:
-    scene = spectra_on_a_wall()
-    scene = replace(scene, objects=(replace(scene.objects[0], material=material), *scene.objects[1:]))
-    reference = cached_reference(scene, 96, 48, photons=400_000).rgb
-    picture = render(scene, replace(SETTINGS, layer="caustic")).rgb
-    assert picture.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.02)
-    assert error(picture, reference) < 0.05
-    seen = slit_seen_through()
-    seen = replace(seen, objects=(replace(seen.objects[0], material=material), *seen.objects[1:]))
-    reference = cached_camera_reference(seen, 96, 48, samples=1500).rgb
-    picture = render(seen, SETTINGS).rgb
-    assert picture.sum(axis=(0, 1)) == pytest.approx(reference.sum(axis=(0, 1)), rel=0.03)
-    assert error(picture, reference) < 0.06

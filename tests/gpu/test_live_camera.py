@@ -15,7 +15,7 @@ from spectrasplat.edit.picking import pick
 from spectrasplat.edit.projection import View
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.device_traits import Budget
-from spectrasplat.model.environment import gradient, world_to_local
+from spectrasplat.model.environment import world_to_local
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import SpotLight
 from spectrasplat.model.optics.spectrum import illuminant
@@ -23,10 +23,8 @@ from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.solo import solo_scene
-from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.engine import PREVIEW_S, LiveEngine
 from spectrasplat.render.viewer.glass_steps import STEPS, GlassSteps
-from spectrasplat.render.viewer.invalidation import appearance_differs, dirty_level
 from spectrasplat.render.viewer.live_camera import MOVING_TAPS, _side
 from spectrasplat.render.viewer.spectrum_guess import guess_weights
 
@@ -164,73 +162,6 @@ def test_only_whole_cycles_of_bands_are_shown_and_smooth_samples_before(engine: 
     # After bands came into view nothing of the whole spectrum replaces them unless the maps became finer.
     rgb, mask = picture(engine), in_glass(engine, (SIZE[1], SIZE[0]))
     assert np.abs(rgb[mask][:, 0] - rgb[mask][:, 2]).max() > 0.1 * WHITE  # fringes
-
-
-@pytest.mark.slow
-def test_better_maps_wait_for_a_cycle_and_the_last_are_shown(engine: LiveEngine, stage: Scene) -> None:
-    engine.target_photons = 1 << 16
-    wanted = inputs(edited(edged(stage), 3.0))
-    engine.set(wanted)
-    until(
-        lambda: (
-            engine._camera_pass.is_within_cycle and engine._shown is not None and engine._shown.accumulation.number >= 1
-        ),
-        engine,
-    )
-    maps = engine._maps
-    engine._shown.accumulation.number += 1
-    engine._maps_ready()
-    assert engine._maps is maps and engine.schedule.maps_wait and not engine.is_idle
-    engine._shown.accumulation.number -= 1
-    until(lambda: engine.is_idle, engine)
-    assert engine._maps is not maps and not engine.schedule.maps_wait
-    assert engine.stats.photons == pytest.approx(engine._shown.light.light_pass.maps.photon_weight, abs=1)
-
-
-@pytest.mark.slow
-def test_an_edited_dispersion_changes_what_is_seen_in_glass_and_traces_nothing(
-    engine: LiveEngine, gl: Context, stage: Scene
-) -> None:
-    scene = edged(stage)
-    before = settle(engine, inputs(scene))
-    rays, mask = engine.stats.rays_traced, in_glass(engine, before.shape)
-    changed = edited(scene, 4.0)
-    assert (
-        appearance_differs(inputs(scene), inputs(changed))
-        and dirty_level(inputs(scene), inputs(scene), inputs(changed)) == DirtyLevel.SPLAT
-    )
-    after = settle(engine, inputs(changed))
-    assert engine.stats.rays_traced == rays and engine.stats.first_order
-    change = np.abs(after - before).max(axis=-1)
-    assert (change[mask] > 0.1 * WHITE).mean() > 0.05
-    fresh = LiveEngine(gl, engine.budget)
-    fresh.target_photons = engine.target_photons
-    expected = settle(fresh, inputs(changed))
-    fresh.release()
-    assert np.sqrt(((after - expected)[mask] ** 2).mean()) < 0.15 * np.sqrt(((before - expected)[mask] ** 2).mean())
-
-
-@pytest.mark.slow
-def test_environments_are_only_looked_at_and_a_turned_one_is_not_sent_again(engine: LiveEngine, stage: Scene) -> None:
-    plain = settle(engine, inputs(stage))
-    rays, shown = engine.stats.rays_traced, engine._shown
-    striped = edged(stage)
-    turned = replace(
-        striped, environment=replace(striped.environment, world_to_local=world_to_local((0.0, 0.0, 1.0), 4.0))
-    )
-    graded = replace(stage, environment=gradient((0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), lights=False))
-    for scene in (striped, turned, graded):
-        assert dirty_level(engine._inputs, engine._inputs, inputs(scene)) == DirtyLevel.CAMERA
-    corner = settle(engine, inputs(striped))[:4, :, 0]
-    assert np.ptp(corner) > 0.9 * WHITE
-    store = engine._camera_pass._pictures
-    opposite = settle(engine, inputs(turned))[:4, :, 0]
-    assert engine._camera_pass._pictures is store
-    assert np.corrcoef(corner.ravel(), opposite.ravel())[0, 1] < -0.8
-    blue = settle(engine, inputs(graded))[:4].mean(axis=(0, 1))
-    assert blue[0] > 10 * blue[1] and engine._camera_pass._pictures is not store
-    assert np.allclose(settle(engine, inputs(stage)), plain, atol=1e-4 * WHITE)
-    assert engine.stats.rays_traced == rays and engine._shown is shown
 
 
 def test_one_wavelength_leaves_the_environment_dark(stage: Scene) -> None:

@@ -102,17 +102,3 @@ def test_another_roughness_is_only_looked_at_and_a_coat_is_built() -> None:
     assert level(Diffuse(), COATED) == DirtyLevel.BUILD
     assert level(Diffuse(), Diffuse(diffuse_roughness=0.5)) == DirtyLevel.BUILD
     assert level(COATED, replace(COATED)) == DirtyLevel.NOTHING
-
-
-@pytest.mark.slow
-def test_an_edited_roughness_is_seen(gl: Context, engine: LiveEngine) -> None:
-    wanted = LiveInputs(scene_of(COATED), CAMERA, *SIZE)
-    before = settled(engine, wanted)
-    polished = LiveInputs(set_material(wanted.scene, 1, replace(COATED, roughness=0.05)), CAMERA, *SIZE)
-    after = settled(engine, polished)
-    fresh = LiveEngine(gl, Budget(8192, 1 << 12, 1 << 13, 1 << 24))
-    fresh.target_photons, fresh.refine_when_still = 1 << 12, False
-    expected = settled(fresh, polished)
-    fresh.release()
-    changed = abs(blocks(after) / blocks(before) - 1.0).max()
-    assert changed > 0.1 and abs(blocks(after) / blocks(expected) - 1.0).max() < 0.1 * changed

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
-from spectrasplat.model.lights import AreaLight, CollimatedLight
+from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectrum import constant as white
@@ -21,7 +21,6 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment
 from spectrasplat.reference import glasses
 from spectrasplat.reference.glasses import D_NM
-from spectrasplat.reference.photon_reference import render_reference
 from spectrasplat.render.still import RenderStats, render
 from spectrasplat.stress.rigs.gpu_paths import REFLECTED, REFRACTED, extruded, glass, placed, trace_beam
 
@@ -181,67 +180,10 @@ def test_the_rainbow(gl) -> None:
     assert shares[1] / shares[0] - 1.0 == pytest.approx(0.116, abs=5e-3)
 
 
-def panes(polarisation: bool, v_d: float = 20.0) -> list[SceneObject]:
-    """Two steep panes one under the other, the second's plane of incidence across the first's."""
-    objects = []
-    for k, axis in enumerate(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))):
-        matrix = np.eye(4)
-        matrix[:3, :3], matrix[2, 3] = turned(axis, ANGLE), 12.0 - 6.0 * k
-        pane = primitives.box((8.0, 8.0, 0.4))
-        objects.append(SceneObject(f"pane {k}", pane, Dielectric(from_abbe(INDEX, np.inf)), matrix))
-    return objects
-
-
 ABOVE = Camera((0.0, 0.0, 20.0), (0.0, 0.0, 0.0), up=(0.0, 1.0, 0.0), kind="orthographic", vertical_extent=0.4)
 
 
-def lit_panes(polarisation: bool, v_d: float = 20.0) -> Scene:
-    """Light that falls through both onto a floor."""
-    floor = SceneObject("floor", primitives.plane(8.0, 8.0), Diffuse())
-    light = CollimatedLight("light", white(1.0), (0.0, 0.0, 20.0), (0.0, 0.0, -1.0), radius=0.3)
-    objects = (floor, *panes(polarisation, v_d))
-    return Scene("panes", ABOVE, (light,), objects, render=RenderDefaults(polarisation=polarisation))
-
-
-def known_share(polarisation: bool, v_d: float = 20.0) -> float:
-    """Of that light, by electric fields (2^16 photons: to 2e-3), or by the mean of s and p."""
-    balance = render_reference(lit_panes(polarisation, v_d), 4, 4, photons=1 << 16).fates
-    return balance["deposited"] / balance["emitted"]
-
-
 # Beams of few photons leave up to a per cent of wide bands unaccounted (docs/beams.md).
-@pytest.mark.slow
-@pytest.mark.parametrize(("method", "tolerance"), [("srd", 0.015), ("srd-photons", 5e-3)])
-def test_panes_across_each_other_against_electric_fields(gl, method: str, tolerance: float) -> None:
-    """By beams and by photons, reflections in the panes included; by means a seventeenth more would pass."""
-    found, known = [], []
-    for polarisation in (True, False):
-        scene = lit_panes(polarisation)
-        known.append(known_share(polarisation))
-        settings = RenderSettings(32, 18, photons=20_000, spp=1, method=method, layer="caustic", tally=True)
-        found.append(deposited(render(scene, settings, context=gl).stats))
-        assert found[-1] == pytest.approx(known[-1], rel=tolerance)
-    assert known[0] / known[1] < 0.95
-    assert found[0] / found[1] == pytest.approx(known[0] / known[1], rel=4e-3)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("v_d", [np.inf, pytest.param(20.0, marks=pytest.mark.slow)], ids=["one index", "dispersive"])
-def test_what_a_camera_sees_through_panes_across_each_other(gl, v_d: float) -> None:
-    """A lamp as large as the floor: by reciprocity as much of it as would come the other way."""
-    seen, known = [], []
-    for polarisation in (True, False):
-        lamp = AreaLight("lamp", white(1.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), shape="rectangle", width=8.0, height=8.0)
-        scene = replace(lit_panes(polarisation, v_d), lights=(lamp,), objects=tuple(panes(polarisation, v_d)))
-        aside = np.eye(4)
-        aside[0, 3] = 30.0
-        bare = replace(scene, objects=(SceneObject("aside", primitives.plane(1.0, 1.0), Black(), aside),))
-        settings = RenderSettings(8, 8, photons=1000, spp=256)
-        through, straight = (render(each, settings, context=gl).rgb[..., 1].mean() for each in (scene, bare))
-        seen.append(float(through / straight))
-        known.append(known_share(polarisation, v_d))
-    assert seen == pytest.approx(known, rel=8e-3)
-    assert seen[0] / seen[1] == pytest.approx(known[0] / known[1], rel=4e-3)
 
 
 def test_light_of_the_environment_through_a_slab(gl) -> None:

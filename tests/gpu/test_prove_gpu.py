@@ -43,17 +43,6 @@ def told(monkeypatch: pytest.MonkeyPatch, **scripts: str) -> None:
 
 
 @pytest.mark.slow
-def test_the_short_form_on_this_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, proof = proved(tmp_path, "--parts", "answers", "--short")
-    out = capsys.readouterr().out
-    assert code == 0, out
-    assert [part["key"] for part in proof["parts"]] == ["doctor", "answers"]
-    assert [part["state"] for part in proof["parts"]] == ["holds", "holds"]
-    assert "tir-margin" in {finding["name"] for finding in proof["parts"][1]["findings"]}
-    assert out.count("holds") == 2
-
-
-@pytest.mark.slow
 def test_the_whole_short_form_on_this_machine(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, proof = proved(tmp_path, "--short")
     assert code == 0, capsys.readouterr().out
@@ -91,19 +80,6 @@ def test_figures_are_lines_of_json(tmp_path: Path, capsys: pytest.CaptureFixture
     assert proof["quick"] and proof["short"]
 
 
-def test_a_crash_among_figures_is_a_line(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    found = 'out.write(\'{"name": "prism", "value": "", "figures": {"ms": 4.5}}\\n\'); '
-    told(monkeypatch, frames=found + "os.kill(os.getpid(), signal.SIGSEGV)", trace=found)
-    code, _ = proved(tmp_path, "--quick")
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert [line["part"] for line in lines if "ended" in line] == ["doctor", *MEASURED_PARTS]
-    assert next(line for line in lines if line["part"] == "trace") == {"part": "trace", "name": "prism", "ms": 4.5}
-    crash = next(line for line in lines if line["part"] == "frames" and "ended" in line)
-    assert code == prove_gpu.FIRST_CODE + 2 and crash["ended"] == "crashed" and "SIGSEGV" in crash["why"]
-
-
 def test_photons_of_a_frame_lie_on_the_line_through_what_was_measured() -> None:
     costs = [FrameCost(n, 0, 2e-9 * n, 1e-3 + 3e-9 * n, 2e-3) for n in (1 << 20, 1 << 17, 1 << 18)]
     assert photons_within(costs, 4e-3, with_camera=False) == pytest.approx(1e6, rel=1e-3)
@@ -132,15 +108,6 @@ def test_a_part_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [part["state"] for part in proof["parts"]] == ["holds", "too slow", "holds"]
 
 
-def test_it_ends_in_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told(monkeypatch, answers="time.sleep(60)")
-    monkeypatch.setattr(prove_gpu, "WHOLE_S", 2.0)
-    code, proof = proved(tmp_path, "--parts", "answers,stress")
-    assert code == 130
-    assert [part["state"] for part in proof["parts"]] == ["holds", "stopped", "not begun"]
-    assert "time was over" in proof["parts"][1]["detail"]
-
-
 def test_without_a_device_nothing_else_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     told(monkeypatch, doctor='print("no OpenGL", file=sys.stderr); sys.exit(2)')
     code, proof = proved(tmp_path)
@@ -159,28 +126,15 @@ def test_a_device_that_lacks_something_is_measured_all_the_same(
     assert [part["state"] for part in proof["parts"]] == ["broken", "holds"]
 
 
-def test_what_only_measures_is_cut(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    told(monkeypatch, trace="time.sleep(60)")
-    impatient = [replace(part, limit_s=(1.0, 1.0) if part.key == "trace" else part.limit_s) for part in PARTS]
-    monkeypatch.setattr(prove_gpu, "PARTS", impatient)
-    code, _ = proved(tmp_path, "--quick")
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert code == 0 and lines[0]["limit_s"] == prove_gpu.QUICK_S and lines[0]["trace_limit_s"] == 1.0
-    assert {line["part"]: line["ended"] for line in lines if "ended" in line}["trace"] == "cut"
-    assert sum(part.limit_s[0] for part in prove_gpu.chosen_parts(None, quick=True)) <= prove_gpu.QUICK_S
-
-
-@pytest.mark.parametrize(("number", "after_s"), [(signal.SIGTERM, 0.5), (signal.SIGINT, 6.0)])
-def test_a_signal_leaves_whole_lines(tmp_path: Path, number: signal.Signals, after_s: float) -> None:
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_leaves_whole_lines(tmp_path: Path, number: signal.Signals) -> None:
     command = [sys.executable, "-P", "-m", "spectrasplat", "prove-gpu", "--quick", "--short", "-o", str(tmp_path)]
     heeding = partial(signal.signal, number, signal.SIG_DFL)  # which shells' background jobs do not
     pipe = subprocess.PIPE
     with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, preexec_fn=heeding) as process:
         assert process.stdout is not None
         first = process.stdout.readline()
-        time.sleep(after_s)
+        time.sleep(0.5)
         process.send_signal(number)
         out, err = process.communicate(timeout=60)
     lines = [json.loads(line) for line in (first + out).splitlines()]

@@ -161,18 +161,6 @@ def test_methods_agree_on_energy(gl, tmp_path: Path, of_beams: float, method: st
     assert energy(gl, tmp_path, method) == pytest.approx(of_beams, rel=0.03)
 
 
-@pytest.mark.core
-def test_map_layer_and_bins(gl, tmp_path: Path) -> None:
-    scene = scene_of(tmp_path)
-    settings = replace(SMALL, photons=60_000, layer="map:table", width=128, height=128)
-    xyz = render(scene, settings, context=gl)
-    bins = render(scene, replace(settings, bins=8), context=gl)
-    assert xyz.rgb.shape == (128, 128, 3)
-    assert bins.spectral is not None and bins.spectral.shape == (128, 128, 8)
-    assert len(bins.bin_edges_nm) == 9
-    assert bins.rgb.sum() == pytest.approx(xyz.rgb.sum(), rel=0.05)
-
-
 def test_a_stop_keeps_what_is_done(gl, tmp_path: Path) -> None:
     """Asked to stop at once, a rendering still is a complete (coarser) picture of the right brightness."""
     scene = scene_of(tmp_path)

@@ -11,18 +11,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from spectrasplat.base import paths
 from spectrasplat.base.errors import UserError
 from spectrasplat.features.features import Features
 from spectrasplat.gpu import splat_way
 from spectrasplat.gpu.context import Context, create_context
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.splat_way import FLOAT_ATOMICS, SplatWay
-from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.footprint import MOST_GROUPS, PIECE_TEXELS, SPLAT, TEAMS, VERTICES
 from spectrasplat.passes.map_atlas import MapAtlas
-from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.splat_rig import Rig, photons
 
 SIZE = 130, 101
@@ -283,20 +279,6 @@ def test_targets_without_scratch_textures_are_added_to_as_well(gl: Context) -> N
     compute.atlas.release()
     compute.atlas = MapAtlas(gl.ctx, raster.atlas.size, np.zeros(0), 2, scratched=1)
     assert difference(want, drawn(compute, records)) < 3e-4
-
-
-@pytest.mark.parametrize("scene", ["prism", pytest.param("ball", marks=pytest.mark.slow)])
-def test_a_picture_is_the_same_either_way(monkeypatch: pytest.MonkeyPatch, scene: str) -> None:
-    pictures = []
-    for way in ("raster", "compute"):
-        monkeypatch.setenv(splat_way.ENVIRONMENT_VARIABLE, way)
-        with create_context() as context:
-            assert context.traits.splats_by_compute == (way == "compute")
-            settings = RenderSettings(width=96, height=54, photons=20_000, spp=1)
-            file = paths.assets_dir() / "scenes" / f"{scene}.toml"
-            pictures.append(render(load_scene(file), settings, context=context).rgb.astype(np.float64))
-    raster, compute = pictures
-    assert np.mean((raster - compute) ** 2 / (raster**2 + 1e-2 * raster.mean() ** 2)) < 1e-6
 
 
 def test_only_known_ways_can_be_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

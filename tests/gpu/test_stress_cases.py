@@ -7,17 +7,14 @@ What each can see is its bound, printed by `spectrasplat stress`.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from spectrasplat.gpu import scene_geometry
-from spectrasplat.gpu.gpu_space import GpuSpace
 from spectrasplat.gpu.records import FLAG_FOOTPRINT_DROPPED
 from spectrasplat.model.geometry.primitives_round import ellipsoid
-from spectrasplat.model.optics.glass import from_abbe
-from spectrasplat.model.scene import Diffuse, Scene
+from spectrasplat.model.scene import Diffuse
 from spectrasplat.reference import optics
 from spectrasplat.stress import case as judging
 from spectrasplat.stress.case import Case
@@ -245,35 +242,6 @@ def test_case_notices_a_mistake_in_a_shader(gl, monkeypatch: pytest.MonkeyPatch,
     mutate(monkeypatch, tmp_path, file, old, new)
     sentences = broken({**LIGHT, **CAMERA}[name], gl)
     assert sentences and said in sentences
-
-
-@pytest.mark.slow
-def test_one_glass_agrees_with_the_reference_and_one_of_other_dispersion_does_not(gl, monkeypatch) -> None:
-    """V_d 20 seen; then V_d 8 in the reference."""
-    case = camera_surfaces.eye_glasses.only(camera_surfaces.GLASSES[0])
-    assert broken(case, gl) == ""
-    true_reference, wrong = camera_surfaces.render_camera_reference, from_abbe(1.6, 8.0)
-
-    def reference(scene: Scene, *arguments, **options):
-        objects = tuple(replace(item, material=replace(item.material, dispersion=wrong)) for item in scene.objects)
-        return true_reference(replace(scene, objects=objects), *arguments, **options)
-
-    monkeypatch.setattr(camera_surfaces, "render_camera_reference", reference)
-    assert "error of colour" in broken(case, gl)
-
-
-@pytest.mark.slow
-def test_a_stone_ten_thousand_extents_off_looks_the_same(gl, monkeypatch: pytest.MonkeyPatch) -> None:
-    """And where GPU space is not fitted to the glass, the case says so."""
-    case = camera_solids.eye_scale.only(camera_solids.CHANGES[-1])
-    assert broken(case, gl) == ""
-    monkeypatch.setattr(GpuSpace, "of", staticmethod(lambda scene: GpuSpace(np.zeros(3), 1.0)))
-    assert "error of picture" in broken(case, gl)
-
-
-@pytest.mark.slow
-def test_a_sun_in_a_panorama_is_linear(gl) -> None:
-    assert broken(camera_lights.eye_sun.only(1e2, 1e8), gl) == ""
 
 
 def test_needles_notice_triangles_begun_at_any_corner(gl, monkeypatch: pytest.MonkeyPatch) -> None:

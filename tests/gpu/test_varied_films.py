@@ -73,7 +73,7 @@ def test_newtons_rings_by_photons(gl: Context) -> None:
     assert stretch(found, 2.0, expected, radii) == pytest.approx(1.0, abs=4e-3)
 
 
-@pytest.mark.parametrize("polarised", [False, True])
+@pytest.mark.parametrize("polarised", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_newtons_rings_seen(gl: Context, polarised: bool) -> None:
     """Reflected white, with what both faces of the block reflect, before black."""
     camera = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=2.0)
@@ -93,7 +93,7 @@ def draining(**more) -> Dielectric:
     return Dielectric(constant(1.33), thin=True, film_nm=900.0, film_from_nm=30.0, film_along=(0.0, -1.0, 0.0), **more)
 
 
-@pytest.mark.parametrize("polarised", [False, True])
+@pytest.mark.parametrize("polarised", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_a_draining_film_as_the_reference_sees_it(gl: Context, polarised: bool) -> None:
     """Tilted and stretched, with a bubble of water and a ball of glass under oil, before a sky."""
     camera = Camera((0.2, -0.3, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), vertical_fov_deg=22.0)

@@ -23,6 +23,7 @@ def grain(picture: np.ndarray) -> float:
     return float(np.sort(away, axis=None)[: round(0.99 * away.size)].mean() / luminance.mean())
 
 
+@pytest.mark.slow
 def test_reflections_within_a_ball_have_no_grain(gl) -> None:
     """What was reflected three times inside meets the caustic below: followed, not drawn by chance. Measured: 0.0044,
     and 0.094 where parts of up to 0.004 were left to chance."""
@@ -72,6 +73,7 @@ def test_the_left_border_of_water_has_no_coloured_streaks(gl) -> None:
     assert np.std(colour - gaussian_filter1d(colour, 3.0, axis=0)) < 0.02
 
 
+@pytest.mark.slow
 def test_ground_glass_has_no_specks(gl) -> None:
     """A lamp and windows seen through the rougher ball. Measured: 0.155, and 0.221 where samples looked up points."""
     scene = load_scene(assets_dir() / "scenes" / "frosted.toml")

@@ -230,6 +230,7 @@ with Window(visible=False) as window:
 """
 
 
+@pytest.mark.slow
 def test_what_is_exported_beside_the_window_is_the_same_to_the_bit(tmp_path: Path, display: str) -> None:
     done = run(tmp_path, display, "-c", THE_SAME_FILES)
     assert done.stdout.strip() == "8 True", done.stdout + done.stderr
@@ -296,28 +297,6 @@ def test_the_window_is_drawn_while_a_picture_is_rendered(tmp_path: Path, display
     assert beauty == caustic == "True"
     assert float(step_s) > 1.0 > float(frame_s), done.stdout  # 3.1 and 0.4 measured
     assert float(rate) > 3.0, done.stdout
-
-
-DRAWN_WHILE_COMPARING = (
-    ON_PRISM
-    + """
-    longest = []
-    for method in ("reference", "stochastic-even"):
-        session.state = replace(session.state, compare=replace(session.state.compare, mode="wipe", method=method))
-        began = time.perf_counter()
-        gaps = until(lambda: session.jobs.comparison.picture is not None and time.perf_counter() > began + 3.0)
-        longest.append(max(gaps))
-    print(*longest)
-    session.close()
-"""
-)
-
-
-@pytest.mark.slow
-def test_the_window_is_drawn_while_the_first_comparison_is_made(tmp_path: Path, display: str) -> None:
-    done = run(tmp_path, display, "-c", DRAWN_WHILE_COMPARING)
-    assert done.returncode == 0, done.stderr
-    assert max(float(word) for word in done.stdout.split()) < 1.0, done.stdout
 
 
 @pytest.mark.slow

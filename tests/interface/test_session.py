@@ -133,25 +133,6 @@ def test_the_engine_waits_for_the_layout_behind_the_start_page(rig: Rig, monkeyp
     assert calls
 
 
-def test_edits_are_undone_one_by_one_and_a_drag_is_one_step(rig: Rig) -> None:
-    first = rig.session.state.scene
-    rig.rename("a")
-    for name in ("b", "c", "d"):
-        rig.rename(name, "Drag", interacting=True)
-    rig.rename("e", "Drag")  # the value of the last frame, the button is up
-    rig.frame()
-    rig.rename("f", "Drag")
-    rig.frame()
-    assert [entry.label for entry in rig.view_model.history] == ["Open", "Rename", "Drag", "Drag"]
-    names = [rig.ask(requests.Undo()).scene.name for _ in range(4)]
-    assert names[:2] == ["e", "a"]
-    assert rig.session.state.scene is first
-    assert rig.view_model.undo is None and rig.view_model.redo == "Rename" and not rig.view_model.unsaved
-    assert rig.ask(requests.Redo()).scene.name == "a"
-    assert rig.ask(requests.GoTo(3)).scene.name == "f"
-    assert rig.view_model.unsaved
-
-
 def test_undo_of_a_deletion_keeps_the_selection_in_range(rig: Rig) -> None:
     scene = rig.session.state.scene
     last = len(scene.objects) - 1

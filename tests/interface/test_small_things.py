@@ -24,10 +24,8 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics import catalogue
 from spectrasplat.ui import layout
 from spectrasplat.ui.commands import command
-from spectrasplat.ui.panels import dialogs, file_browser
-from spectrasplat.ui.panels.abbe import place_of_name
+from spectrasplat.ui.panels import file_browser
 from spectrasplat.ui.session import Session
-from spectrasplat.ui.view_model import ViewModel
 
 from tests.interface.fake_engine import FakeEngine
 from tests.interface.shell_rig import ShellRig
@@ -90,12 +88,6 @@ def test_what_is_remembered_is_written_at_once(gl: Context, tmp_path: Path, monk
     assert load_settings()[0].recent == (tmp_path / "own.toml",)
     session.autosave.close()
     session.release()
-
-
-def test_saving_never_begins_in_the_programs_own_folder(tmp_path: Path) -> None:
-    shipped, own = assets_dir() / "scenes" / "prism.toml", tmp_path / "own.toml"
-    assert dialogs._folder(ViewModel(recent=(shipped,))) == Path.home()
-    assert dialogs._folder(ViewModel(recent=(shipped, own))) == tmp_path
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".jpeg", ".webp"])
@@ -175,35 +167,6 @@ def test_help_is_seen_on_the_start_page_and_quit_works_in_a_menu(gl: Context) ->
         rig.frame(2)
         rig.key(imgui.Key.q, [imgui.Key.mod_ctrl])
         assert requests.Quit() in rig.asked
-
-
-def test_f11_asks_for_the_whole_screen(gl: Context) -> None:
-    with ShellRig(gl) as rig:
-        rig.key(imgui.Key.f11)
-        assert rig.asked == [requests.FullScreen()]
-
-
-def test_render_comes_before_the_tabs_beside_it(gl: Context) -> None:
-    with ShellRig(gl, size=(1440, 900)) as rig:
-        for _ in range(2):
-            rig.key(imgui.Key.f12)
-            rig.frame(3)
-            assert "Render…" in rig.items.items
-            rig.key(imgui.Key.b)  # the brush's panel comes to the same place
-            rig.frame(3)
-            assert "Render…" not in rig.items.items and "Radius" in rig.items.items
-
-
-def test_the_abbe_diagram_stands_beside_the_caustic(gl: Context) -> None:
-    with ShellRig(gl, size=(1440, 900)) as rig:
-        rig.open_panel(abbe=True)
-        rig.frame(4)
-        assert rig.find("Abbe plot").left >= rig.find("Picture").right
-
-
-def test_the_name_of_a_glass_stays_within_the_abbe_diagram() -> None:
-    assert place_of_name(100.0, 40.0, 8.0, 400.0) == 108.0
-    assert place_of_name(380.0, 40.0, 8.0, 400.0) + 40.0 == 372.0  # left of the ring, and it ends before it
 
 
 def test_open_takes_a_typed_name_and_a_whole_path(gl: Context, tmp_path: Path) -> None:
@@ -309,13 +272,6 @@ def test_a_webp_larger_than_the_format_allows_is_refused_before_anything_is_draw
         open_sink(tmp_path / "a.webp", (20000, 10), 24.0, {})
     with pytest.raises(UserError, match="at most 16383 pixels"):
         save_codes(tmp_path / "still.webp", np.zeros((1, 20000, 3), np.uint8))
-
-
-def test_a_still_webp_keeps_colours_that_change_from_pixel_to_pixel(tmp_path: Path) -> None:
-    codes = np.random.default_rng(5).integers(0, 256, (40, 60, 3), np.uint8)
-    save_codes(tmp_path / "a.webp", codes)
-    with Image.open(tmp_path / "a.webp") as image:
-        np.testing.assert_array_equal(np.asarray(image.convert("RGB")), codes)
 
 
 def test_a_guessed_glass_is_said_to_be_a_guess(capsys: pytest.CaptureFixture[str]) -> None:

@@ -86,21 +86,6 @@ def test_dragging_the_dispersion_moves_the_caustic_and_traces_nothing(hands: Han
 
 
 @pytest.mark.slow
-def test_undo_and_redo_bring_the_pictures_back(hands: Hands) -> None:
-    before, traced = hands.settle(), hands.rays_traced
-    select_glass(hands)
-    hands.interface.drag_slider("Dispersion gain", 0.1, 0.3)
-    edited = hands.settle()
-    hands.interface.key(imgui.Key.z, CTRL)
-    assert difference(hands.settle(), before) < SAME
-    hands.interface.key(imgui.Key.y, CTRL)
-    assert difference(hands.settle(), edited) < SAME
-    assert difference(edited, before) > 0.1
-    # Only what beams are too weak for is traced again, and only through the glass as it was at first.
-    assert traced <= hands.rays_traced < 1.1 * traced
-
-
-@pytest.mark.slow
 def test_brushing_widens_the_colours_where_it_paints(hands: Hands) -> None:
     before = hands.settle()
     hands.interface.key(imgui.Key.b)
@@ -130,35 +115,6 @@ def test_walking_round_traces_nothing(hands: Hands) -> None:
     assert hands.rays_traced == traced
     hands.interface.key(imgui.Key._0)
     assert difference(before, hands.settle()) < SAME
-
-
-@pytest.mark.slow
-def test_saving_and_opening_again_keeps_what_was_edited(hands: Hands, scene_file: Path, gl: Context) -> None:
-    start = hands.settle()
-    select_glass(hands)
-    hands.interface.drag_slider("Dispersion gain", 0.1, 0.25)
-    hands.interface.key(imgui.Key.b)
-    hands.interface.drag(hands.caustic_place(0.5), hands.caustic_place(0.55), steps=4)
-    hands.interface.key(imgui.Key.s, CTRL)
-    assert not hands.session.document.unsaved
-    # The file must give the picture of the session once that has been traced with the same glass.
-    hands.interface.key(imgui.Key.r, CTRL)
-    edited = hands.settle()
-    assert not hands.session.picture.stats.first_order
-    scene = hands.session.state.scene
-    with viewer(gl, scene_file) as again:
-        opened = again.session.state.scene
-        assert (
-            opened.objects[again.glass()].material.dispersion.gain
-            == scene.objects[hands.glass()].material.dispersion.gain
-        )
-        assert (
-            len(opened.objects[again.receiver()].local_dispersion)
-            == len(scene.objects[hands.receiver()].local_dispersion)
-            > 0
-        )
-        reopened = again.settle()
-        assert difference(reopened, edited) < SAME < difference(start, edited)
 
 
 def test_the_button_that_closes_the_window_asks(hands: Hands) -> None:

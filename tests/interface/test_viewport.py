@@ -285,22 +285,6 @@ def test_the_brush_paints_a_stroke_on_the_receiver(gl) -> None:
         assert isinstance(rig.state.scene.objects[floor].material, Diffuse)
 
 
-def test_brush_modifiers_and_radius(gl) -> None:
-    with brushing(gl) as rig:
-        floor = receiver_of(rig.state)
-        rig.drag(CENTRE, (CENTRE[0] + 30, CENTRE[1]), keys=[KEY.mod_ctrl])
-        assert rig.state.scene.objects[floor].local_dispersion[-1].log2_gain < 0
-        rig.drag(CENTRE, (CENTRE[0] + 30, CENTRE[1]), keys=[KEY.mod_shift])
-        assert rig.state.scene.objects[floor].local_dispersion[-1].erase > 0
-        camera = rig.state.camera
-        rig.wheel(CENTRE, 2.0, keys=[KEY.mod_shift])
-        assert rig.state.brush.radius > 0.35
-        assert rig.state.camera == camera
-        rig.key(KEY.left_bracket)
-        rig.key(KEY.left_bracket)
-        assert rig.state.brush.radius == pytest.approx(0.3, rel=1e-3)
-
-
 def test_the_brush_refuses_what_is_no_receiver(gl) -> None:
     with brushing(gl) as rig:
         item = rig.state.scene.objects[0]
@@ -308,20 +292,6 @@ def test_the_brush_refuses_what_is_no_receiver(gl) -> None:
         rig.drag(place, (place[0] + 5, place[1]))
         assert rig.labels == []
         assert [type(request) for request in rig.asked] == [Notice]
-
-
-def test_the_ring_of_the_brush_lies_on_the_surface(gl) -> None:
-    with brushing(gl) as rig:
-        rig.move((20, SIZE[1] - 60))
-        rig.frame(2)
-        without = rig.screenshot().astype(int)
-        rig.move(CENTRE)
-        rig.frame(2)
-        drawn = np.abs(rig.screenshot().astype(int) - without).sum(axis=2) > 60
-        centre = np.array(rig.under().position)
-        for way in ([0.3, 0, 0], [-0.3, 0, 0], [0, 0.3, 0], [0, -0.3, 0]):
-            x, y = (int(v) for v in rig.at(centre + way))
-            assert drawn[y - 2 : y + 3, x - 2 : x + 3].any()
 
 
 def held_colour(rig: ViewportRig, local: bool = False) -> Pull:

@@ -1,8 +1,7 @@
 """The known answers T1 to T16 of geometrical optics.
 
 The numbers are the literature's formulas, evaluated on their own in double precision; no tracer had a part in them.
-`tests/unit/test_known_answers.py` holds them against float64 rays on exact surfaces,
-`tests/gpu/test_known_answers_gpu.py` against all that walks rays on the device (`walkers.py`), on meshes.
+`tests/gpu/test_known_answers_gpu.py` holds them against all that walks rays on the device (`walkers.py`), on meshes.
 """
 
 from __future__ import annotations
@@ -70,8 +69,6 @@ def slab_advance(name: str, nm: float = D_NM) -> tuple[float, float]:
 
 BALL_FOCAL_LENGTHS = (1.45716, 1.46749, 1.47215)
 """T4, a ball of radius 1 of N-BK7: nR/2(n − 1) at the lines."""
-BALL_RAYS = {0.5: (21.505984, 1.363890, 0.460386), 0.8: (42.596776, 1.181973, 0.818556)}
-"""T4: by height at the d line, deviation in degrees, where the axis is crossed, ∂deviation/∂n."""
 PLANO_CONVEX_FOCAL_LENGTHS = (1.91433, 1.93498, 1.94431)
 """T5, radius 1, N-BK7, at the lines."""
 APLANATIC_IMAGES = {(F_NM, 10): -1.5309890, (F_NM, 80): -1.5635224} | {

@@ -12,12 +12,11 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from jinja2 import UndefinedError
 from spectrasplat.base.errors import UserError
 from spectrasplat.bench.curves import best_baseline, time_to_error
 from spectrasplat.bench.report import curve_plots, pictures, report, style, tables
 from spectrasplat.bench.report import text as report_text
-from spectrasplat.bench.report.page import PROSE, render
+from spectrasplat.bench.report.page import PROSE
 from spectrasplat.bench.results import BenchResult, Curve, Point, SceneResult, SpeedUp
 from spectrasplat.reference.metrics import EPSILON_SHARE
 
@@ -126,17 +125,6 @@ def test_page_stands_alone_and_holds_everything(written: tuple[BenchResult, Path
     assert "To a relMSE of 1 % srd is, by photon time, faster than the best of all baselines" in page.text
 
 
-def test_files_are_whole_and_nothing_else_is_left(written: tuple[BenchResult, Path]) -> None:
-    _, directory = written
-    stems = [f"{scene}_error_{over}" for scene in ("ball", "wine_glass") for over in ("time", "photons")]
-    stems += ["scenes"]
-    files = {path.name for path in (directory / "plots").iterdir()}
-    assert files == {stem + suffix for stem in stems for suffix in (".png", ".svg")}
-    assert not [p for p in directory.rglob("*") if ".part" in p.name]
-    for path in (directory / "plots").glob("*.svg"):
-        assert_numbers_are_finite(path.read_text(encoding="utf-8"))
-
-
 @pytest.mark.parametrize(
     ("seconds", "at_once", "baseline", "baseline_at_once", "told"),
     [
@@ -153,14 +141,6 @@ def test_a_speed_up_says_what_is_known_of_it(
 ) -> None:
     one = SpeedUp(0.01, "photon", seconds, at_once, baseline, 10.0, baseline_at_once)
     assert report_text.speed_up_text(one) == told and report_text.speed_up_text(None) == "–"
-
-
-def test_the_kernels_that_were_tried_are_listed(tmp_path: Path) -> None:
-    scene, bare = synthetic_scene(tmp_path, "ball"), synthetic_scene(tmp_path, "ball", methods=("srd",))
-    assert tables.kernel_table(bare) is None and tables.speed_up_table(bare) is None
-    assert tables.summary_table(synthetic_result([bare])) is None
-    table = tables.kernel_table(scene)
-    assert table is not None and len(table.rows) == 4 * 4
 
 
 def test_partial_run_of_one_method_and_one_seed(tmp_path: Path) -> None:
@@ -289,40 +269,6 @@ def test_tables_as_markdown(tmp_path: Path) -> None:
     assert len(rows_of_bare) == 5 and all(set(line[9:]) <= set("|– ") for line in rows_of_bare)
 
 
-def test_reference_warning_begins_at_a_tenth(tmp_path: Path) -> None:
-    scene = synthetic_scene(tmp_path, "x")
-    least = report_text.smallest_error(scene)
-    for share, warned in ((0.099, False), (0.101, True)):
-        scene.reference.relmse = share * least
-        assert any("times the smallest error" in told for told in report_text.warnings_of(scene)) is warned
-
-
-def test_busy_machine_is_told(tmp_path: Path) -> None:
-    for factor, told in ((0.95, False), (0.85, True)):
-        times = ((1000, 1.0), (2000, factor), (4000, 2.0))
-        scene = made_of([Point(n, s, 1e-3, 1e-3, 1e-3, 0.0, 1e-3) for n, s in times], tmp_path)
-        assert any("the machine was busy" in one and "srd" in one for one in report_text.warnings_of(scene)) is told
-
-
-def test_same_result_gives_the_same_svg_and_dark_screens_exchange_every_colour(tmp_path: Path) -> None:
-    scene = synthetic_scene(tmp_path, "ball")
-    with style.plot_style():
-        first, second = (svg_of(curve_plots.error_against(scene, "seconds")) for _ in range(2))
-    assert first == second
-    inline = style.inline_svg(first, "a", "label")
-    assert not re.search(r"#[0-9a-fA-F]{6}(?![0-9a-fA-F])", re.sub(r'(href="|url\()#', "", inline))
-
-
-def test_labels_are_pushed_apart_as_little_as_can_be() -> None:
-    for wanted, places in (
-        ([10, 40, 90], [10, 40, 90]),
-        ([50, 50, 50], [38, 50, 62]),
-        ([0, 0, 99], [0, 12, 99]),
-        ([99, 99, 99], [76, 88, 100]),
-    ):
-        assert curve_plots.spread(wanted, 12, 100) == pytest.approx(places)
-
-
 def test_crop_finds_structure_and_error_maps_are_true() -> None:
     rng = np.random.default_rng(3)
     reference = np.full((60, 90, 3), 0.05)
@@ -367,19 +313,3 @@ def test_broken_pictures_are_left_out(tmp_path: Path) -> None:
     files = {name: f"{name}.npy" for name in ("reference", "srd", "size", "nan", "object", "cut", "gone")}
     assert sorted(pictures.load_pictures(files, tmp_path)) == ["reference", "srd"]
     assert pictures.load_pictures({"srd": "srd.npy"}, tmp_path) == {}
-
-
-def test_escaping_and_words() -> None:
-    odd = synthetic_result([])
-    odd.version = '"<'
-    assert "<title>Error against run time, SpectraSplat &#34;&lt;</title>" in report.document(odd, [])
-    with pytest.raises(UndefinedError, match="result"):
-        render("bench.html")
-    names = report.file_names(["a/b c", "a_b_c", "", "scenes", "桜"])
-    assert " ".join(names) == "a_b_c a_b_c_2 scene scenes_2 scene_2"
-    numbers = (0.0, math.nan, None, 0.01234, -5.678e-5, 123.0, 0.00999, 9.99e-5, 0.0009999)
-    assert " ".join(map(report_text.number, numbers)) == "0 – – 0.012 −5.7·10⁻⁵ 120 0.010 1.0·10⁻⁴ 0.0010"
-    assert " ".join(map(report_text.superscript, (1.0, 0.001, 3e-5))) == "10⁰ 10⁻³ 3·10⁻⁵"
-    assert [report_text.count(v) for v in (999, 250_000, 16_400_000, 2e9)] == ["999", "250 k", "16.4 M", "2 G"]
-    ratios = [report_text.ratio_text(*v) for v in ((0.81,), (2.345,), (45.4,), (120.0, True))]
-    assert ratios == ["0.81×", "2.3×", "45×", "≥ 120×"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -304,30 +303,6 @@ def test_other_code_strips_anew(stripping: list[int], monkeypatch: pytest.Monkey
     monkeypatch.setattr(stripped_store, "_version", lambda: b"newer")
     stripped_store.stripped(lines(), NO_SWITCHES)
     assert len(stripping) == 2
-
-
-@pytest.mark.parametrize("damage", [b"", b"nothing", None])
-def test_damage_costs_time_only(stripping: list[int], tmp_path: Path, damage: bytes | None) -> None:
-    kept = stripped_store.stripped(lines(), NO_SWITCHES)
-    (file,) = (tmp_path / "shaders").iterdir()
-    file.write_bytes(file.read_bytes()[:-5] if damage is None else damage)
-    assert stripped_store.stripped(lines(), NO_SWITCHES) == kept
-    assert stripped_store.stripped(lines(), NO_SWITCHES) == kept
-    assert len(stripping) == 2
-
-
-def test_without_a_folder_it_works(stripping: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("")
-    monkeypatch.setattr(paths, "cache_dir", lambda: tmp_path / "file")
-    assert stripped_store.stripped(lines(), NO_SWITCHES) == stripped_store.stripped(lines(), NO_SWITCHES)
-    assert len(stripping) == 2
-
-
-def test_what_is_oldest_is_forgotten(stripping: list[int], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(stripped_store, "KEPT", replace(stripped_store.KEPT, most_files=3))
-    for shift in range(6):
-        stripped_store.stripped(lines(shift), NO_SWITCHES)
-    assert len(list((tmp_path / "shaders").iterdir())) == 3
 
 
 def test_sources_are_the_same_from_the_disk(stripping: list[int]) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -192,16 +191,6 @@ def test_shipped_scenes_leave_out_what_they_do_not_need(name: str) -> None:
     assert [p.feature for p in proofs if not p.holds] == []
 
 
-def test_a_scene_without_dispersion_has_no_spectral_code_nor_columns() -> None:
-    features = scene_features("ball_plain")
-    for source in sources(features):
-        for word in ("dposition_dvar", "variable_step", "spectral_variable", "is_cut", "texture("):
-            assert word not in source.text, (source.name, word)
-    forced = replace(features, spectral_groups=1, band_cuts=True)
-    assert costs_of(load_scene(SCENES / "ball_plain.toml"), forced)["spectral columns"] == "32 B a ray, 16 B a photon"
-    assert (features.columns, forced.columns) == (4, 5), "two of the lattice, two of the lamp"
-
-
 def explained(scene: Scene) -> list[tuple[str, bool, str]]:
     return Features.of(scene, RenderSettings()).explain(Facts(scene, RenderSettings()))
 
@@ -239,23 +228,6 @@ def test_what_surfaces_give_each_other_costs_nothing_where_it_is_not_asked_for()
     assert not Features.of(alone, RenderSettings()).bounces and "in one plane" in _reasons(alone)["bounces"]
 
 
-IMAGES = {"HAS_IMAGES": 1, "TEXTURE_COUNT": 1, "BIND_PICTURES": 13, "UNIT_PICTURES": 11, "UNIT_CORNERS": 12}
-PICTURED = {
-    "HAS_TEXTURES": ("painted", "texture_filtered", "uv_gradients", "pictures"),
-    "HAS_ENVIRONMENT_MAP": ("environment_radiance", "pictures", "box_of_three"),
-}
-
-
-def test_pictures_are_looked_up_only_where_there_are_any() -> None:
-    names = {name for symbols in PICTURED.values() for name in symbols}
-    assert all(occurring(source, sorted(names)) == () for source in camera_sources(EVERYTHING))
-    for kind, symbols in PICTURED.items():
-        for source in camera_sources(EVERYTHING, IMAGES | {kind: 1}):
-            assert set(symbols) <= set(occurring(source, symbols)), (kind, source.text.splitlines()[0])
-            others = names - set(symbols) - {"box_of_three"}
-            assert occurring(source, sorted(others)) == (), kind
-
-
 def test_what_is_in_tells_its_bytes_and_what_is_out_tells_none() -> None:
     scene = load_scene(SCENES / "brilliant.toml")
     features = Features.of(scene, RenderSettings())
@@ -271,20 +243,6 @@ def test_the_proof_fails_where_a_program_carries_what_it_should_not(monkeypatch:
     monkeypatch.setattr(shader, "_kept", {})  # nor a text that an earlier test had made
     told = {p.feature: p.holds for p in prove(sources(features), Features())}
     assert not told["triangle tree"] and not told["normal derivatives"] and not told["medium stack"]
-
-
-def test_a_guard_forgotten_in_a_shader_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    mutant = tmp_path / "shaders"
-    for file in paths.shaders_dir().rglob("*"):
-        if file.is_file():
-            copy = mutant / file.relative_to(paths.shaders_dir())
-            copy.parent.mkdir(parents=True, exist_ok=True)
-            copy.write_bytes(file.read_bytes())
-    text = (mutant / "lib" / "intersect.glsl").read_text()
-    (mutant / "lib" / "intersect.glsl").write_text(text.replace("if (HAS_TREE)", "if (true)"))
-    monkeypatch.setattr(paths, "shaders_dir", lambda: mutant)
-    proofs = prove(sources(scene_features("prism")), Features())
-    assert not next(p for p in proofs if p.feature == "triangle tree").holds
 
 
 @pytest.mark.parametrize("editable", [False, True])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -176,18 +175,6 @@ def test_abbe_model_is_khr_dispersion() -> None:
     assert anomalous.derivative(550.0) > 0.0 and any("anomalous" in note for note in anomalous.notes())
 
 
-def test_named_glass_differs_from_the_khr_model_as_known() -> None:
-    for name, gap in (("N-SF11", -0.0070), ("N-SF66", -0.0136)):
-        real = catalogue.find(name)
-        model = glass.from_abbe(real.n_d, real.V_d)
-        assert model.index(400.0) - real.index(400.0) == pytest.approx(gap, abs=1e-4)
-
-
-def test_gltf_dispersion_both_ways() -> None:
-    assert glass.abbe_to_gltf_dispersion(40.0) == 0.5 and glass.gltf_dispersion_to_abbe(0.5) == 40.0
-    assert glass.abbe_to_gltf_dispersion(math.inf) == 0.0 and glass.gltf_dispersion_to_abbe(0.0) == math.inf
-
-
 def test_coefficients_tables_and_cauchy_agree() -> None:
     """N-BK7 from its coefficients, and from a table of it every 20 nm, is N-BK7."""
     real = catalogue.find("N-BK7")
@@ -210,11 +197,6 @@ def test_table_is_pchip_in_inverse_square_wavelength() -> None:
     n = np.array([1.56, 1.55, 1.53, 1.531, 1.52, 1.519, 1.515])
     reference = PchipInterpolator(wavelength[::-1] ** -2.0, n[::-1])
     assert glass.table(wavelength, n).index(VISIBLE) == pytest.approx(reference(VISIBLE**-2.0), abs=1e-13)
-
-
-def test_table_is_monotone_where_the_data_are() -> None:
-    steep = glass.table([380, 400, 410, 600, 780], [1.9, 1.89, 1.6, 1.599, 1.5])
-    assert np.all(np.diff(steep.index(np.linspace(380, 780, 4001))) <= 0.0)
 
 
 def test_notes_say_index_below_one() -> None:
@@ -278,52 +260,3 @@ def test_a_gain_scales_n_about_the_d_line_and_is_told() -> None:
 def test_an_impossible_gain_is_refused(gain: float) -> None:
     with pytest.raises(UserError, match="block: "):
         glass.with_gain(catalogue.find("N-SF11"), gain, "block")
-
-
-def test_distinct_gains_are_distinct_glasses_to_the_renderer() -> None:
-    from spectrasplat.features.facts import dispersive_glasses
-    from spectrasplat.features.features import Features
-    from spectrasplat.gpu.spectral_groups import Groups
-    from spectrasplat.model.geometry import primitives
-    from spectrasplat.model.optics.spectral_tables import SpectralAxis
-    from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-    from spectrasplat.model.scene_defaults import default_light
-    from spectrasplat.model.scene_key import scene_key
-    from spectrasplat.model.settings import RenderSettings
-
-    def scene(*gains: float) -> Scene:
-        plain = catalogue.find("N-SF11")
-        balls = [
-            SceneObject(f"ball {i}", primitives.box(), Dielectric(glass.with_gain(plain, gain)))
-            for i, gain in enumerate(gains)
-        ]
-        floor = SceneObject("floor", primitives.plane(), Diffuse())
-        return Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (*balls, floor))
-
-    two = scene(1.0, 2.0)
-    assert len(dispersive_glasses(two)) == 2 and len(dispersive_glasses(scene(2.0, 2.0))) == 1
-    features = Features.of(two, RenderSettings())
-    assert Groups.of(two, features).glasses == tuple(o.material.dispersion for o in two.objects[:2])
-    axis = SpectralAxis.build(Groups.of(two, features).glasses)
-    assert len(axis.glasses) == 2
-    one, three = (SpectralAxis.build([glass.with_gain(catalogue.find("N-SF11"), g)]).total for g in (1.0, 3.0))
-    assert three == pytest.approx(3.0 * one)
-    assert scene_key(scene(1.0), 8, 8, 4) != scene_key(scene(2.0), 8, 8, 4)
-
-
-def test_the_float64_references_follow_a_gain() -> None:
-    from reference.path_check import ReferenceScene
-    from spectrasplat.model.geometry import primitives
-    from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-    from spectrasplat.model.scene_defaults import default_light
-    from spectrasplat.reference.photon_scene import TABLE_NM, photon_scene
-
-    item = SceneObject("box", primitives.box(), Dielectric(glass.with_gain(catalogue.find("N-BK7"), 2.5)))
-    floor = SceneObject("floor", primitives.plane(), Diffuse())
-    named = replace(item.material.dispersion, name="N-BK7")
-    item = replace(item, material=Dielectric(named))
-    reference = ReferenceScene.of([item, floor])
-    for nm in (400.0, 587.56, 700.0):
-        assert reference.bodies(nm)[0].index.n == pytest.approx(float(item.material.dispersion.index(nm)), rel=1e-6)
-    packed, _ = photon_scene(Scene("s", Camera((0, -3, 1), (0, 0, 0)), (default_light(),), (item, floor)))
-    np.testing.assert_allclose(packed.refractive_index[0], item.material.dispersion.index(TABLE_NM))

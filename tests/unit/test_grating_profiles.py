@@ -113,9 +113,6 @@ BLAZED = GRATING + 'profile = "blazed"\n'
         (BLAZED + "depth_nm = 200", 'profile = "lamellar"\' as well'),
         (BLAZED + "blaze_nm = 500\nblaze_deg = 10", "cannot stand beside"),
         (BLAZED + "blaze_deg = 60", "so steep"),
-        (BLAZED + "efficiency = [0.3, 0.3, 0.3]", "must be a number"),
-        (BLAZED + "efficiency = 1.2", "at most 1"),
-        (GRATING + 'profile = "lamellar"\ndepth_nm = -5', "at least 0"),
         (GRATING + 'profile = "slits"\nopen = 0', "above 0"),
     ],
 )

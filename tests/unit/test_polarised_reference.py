@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.lights import CollimatedLight
-from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.spectrum import laser
 from spectrasplat.model.scene import Camera, Dielectric, Diffuse, RenderDefaults, Scene, SceneObject
@@ -85,19 +84,6 @@ def test_a_pile_of_plates_lets_p_through_at_brewsters_angle():
     assert ray.degree == pytest.approx((1.0 - t_s ** (2 * plates)) / (1.0 + t_s ** (2 * plates)), rel=1e-9)
 
 
-@pytest.mark.parametrize(("glass", "error"), [("N-BK7", -0.0033), ("N-SF11", -0.0301), ("N-SF66", -0.0921)])
-def test_a_prism_at_minimum_deviation(glass, error):
-    """60°, at 587.6 nm: both faces favour p, so more passes than the means of each say; `error` is theirs."""
-    n = float(find(glass).index(np.array(587.5618)))
-    incidence = np.arcsin(0.5 * n)
-    t_s, t_p = shares(incidence, 1.0 / n)
-    ray = Ray(incident(incidence))
-    ray.meets(UP, 1.0 / n, False)
-    ray.meets(rotated(SIDE, -np.radians(60.0), UP), n, False)
-    assert ray.power == pytest.approx(0.5 * (t_s**2 + t_p**2), rel=1e-9)
-    assert (0.5 * (t_s + t_p)) ** 2 / ray.power - 1.0 == pytest.approx(error, abs=1e-4)
-
-
 def test_planes_of_incidence_at_an_angle():
     """Of light that a first face let through, a second whose plane of incidence is turned by φ takes s and p by
     Malus's law; across each other, T_s T_p."""
@@ -114,23 +100,6 @@ def test_planes_of_incidence_at_an_angle():
         wanted = 0.5 * (t_s * (along * t_s + across * t_p) + t_p * (across * t_s + along * t_p))
         assert ray.power == pytest.approx(wanted, rel=1e-9)
     assert ray.power == pytest.approx(t_s * t_p, rel=1e-9)
-
-
-@pytest.mark.parametrize(("order", "error"), [(1, 0.1161), (2, -0.0926)])
-def test_a_rainbow_is_polarised(order, error):
-    """A drop's ray at least deviation (Descartes): in, `order` reflections near Brewster's angle, out; `error` is that
-    of the means."""
-    n = 1.333403
-    incidence = np.arccos(np.sqrt((n * n - 1.0) / (order * (order + 2))))
-    refraction = np.arcsin(np.sin(incidence) / n)
-    t = np.array(shares(incidence, 1.0 / n))
-    ray = Ray(incident(incidence))
-    ray.meets(UP, 1.0 / n, False)
-    for event in range(order + 1):
-        ray.meets(rotated(SIDE, refraction, -ray.direction), n, event < order)
-    wanted = 0.5 * (t**2 * (1.0 - t) ** order).sum()
-    assert ray.power == pytest.approx(wanted, rel=1e-9)
-    assert t.mean() ** 2 * (1.0 - t.mean()) ** order / ray.power - 1.0 == pytest.approx(error, abs=1e-4)
 
 
 def test_fresnels_rhomb_turns_linear_into_circular_light():

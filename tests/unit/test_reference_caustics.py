@@ -16,7 +16,6 @@ from spectrasplat.model.scene import Camera, Dielectric, Scene
 from spectrasplat.reference import caustic_cache, photon_reference, spectral_caustic
 from spectrasplat.reference.camera_reference import (
     KIND,
-    cached_camera_reference,
     picture_noise,
     render_camera_reference,
 )
@@ -72,27 +71,6 @@ def kept(scene: Scene, plan: CausticPlan, folder: Path) -> CachedCaustic:
 
 def quiet(fraction: float, text: str) -> None:
     assert 0.0 <= fraction <= 1.0 and "photons" in text
-
-
-@pytest.mark.slow
-def test_a_finished_reference_builds_nothing(scene: Scene, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    first = cached_camera_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
-    assert first.caustic_photons >= PLAN.photons and 0.0 < first.caustic_relmse < 0.1
-    monkeypatch.setattr(CausticRun, "__init__", lambda *_: pytest.fail("the caustic was prepared again"))
-    again = cached_camera_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
-    assert np.array_equal(first.xyz, again.xyz)
-    assert (again.caustic_photons, again.caustic_relmse) == (first.caustic_photons, first.caustic_relmse)
-
-
-@pytest.mark.slow
-def test_more_samples_look_up_the_stored_caustic(scene: Scene, tmp_path: Path, rounds: list[int]) -> None:
-    cached_camera_reference(scene, *SIZE, samples=16, caustic=PLAN, folder=tmp_path)
-    assert rounds
-    rounds.clear()
-    more = cached_camera_reference(scene, *SIZE, samples=64, caustic=PLAN, folder=tmp_path)
-    assert rounds == [] and more.amount == 64
-    at_once = render_camera_reference(scene, *SIZE, samples=64, caustic=build_caustic(scene, *SIZE, PLAN))
-    np.testing.assert_allclose(more.xyz, at_once.xyz, rtol=1e-6, atol=1e-9 * at_once.xyz.max())
 
 
 def test_an_interrupt_keeps_the_photons(scene: Scene, tmp_path: Path, rounds: list[int]) -> None:

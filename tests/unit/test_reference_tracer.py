@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference.splat import gaussian, swept_gaussian, texel_average
-from reference.surfaces import Plane, sphere
+from reference.splat import swept_gaussian
 from reference.textbook_optics import refract_column_textbook
 from reference.tracer import (
-    AIR,
     RECEIVER,
     Body,
     Index,
@@ -17,11 +15,9 @@ from reference.tracer import (
     central_difference,
     follow,
     make_ray,
-    onto,
-    through,
     trace,
 )
-from spectrasplat.reference import glasses, optics
+from spectrasplat.reference import optics
 
 RNG = np.random.default_rng
 
@@ -34,34 +30,6 @@ def random_events(count: int, seed: int = 1) -> dict[str, np.ndarray]:
     direction = direction - optics.times(np.maximum(2 * optics.dot(direction, normal), 0), normal)
     tangent = lambda v: optics.normalised_derivative(v, rng.normal(size=(count, 3)))  # noqa: E731
     return {"direction": direction, "normal": normal, "ddirection": tangent(direction), "dnormal": tangent(normal)}
-
-
-def test_textbook_and_stable_columns_agree() -> None:
-    events = random_events(2000)
-    eta = RNG(2).uniform(0.4, 1.0, 2000)
-    deta = RNG(3).normal(size=2000)
-    args = (events["direction"], events["ddirection"], events["normal"], events["dnormal"], eta, deta)
-    textbook, stable = refract_column_textbook(*args), optics.refract_column_stable(*args)
-    scale = 1 + np.abs(textbook).max(-1, keepdims=True)
-    assert (np.abs(textbook - stable) / scale).max() < 1e-14
-
-
-def test_invariants_of_refraction_and_reflection() -> None:
-    events = random_events(2000)
-    d, n, dd, dn = (events[k] for k in ("direction", "normal", "ddirection", "dnormal"))
-    eta = RNG(2).uniform(0.4, 1.0, 2000)
-    out = optics.refract(d, n, eta)
-    np.testing.assert_allclose(optics.dot(out, out), 1, atol=1e-14)
-    dout = refract_column_textbook(d, dd, n, dn, eta, np.ones(2000))
-    np.testing.assert_allclose(optics.dot(out, dout) / (1 + np.linalg.norm(dout, axis=-1)), 0, atol=1e-14)
-    mirrored = optics.reflect(d, n)
-    np.testing.assert_allclose(optics.dot(mirrored, optics.reflect_column(d, dd, n, dn)), 0, atol=1e-14)
-    zero = np.zeros((2000, 3))
-    bend = optics.refract_column_stable(d, zero, n, zero, eta, np.ones(2000))
-    sine_i = np.linalg.norm(np.cross(d, n), axis=-1)
-    np.testing.assert_allclose(np.linalg.norm(bend, axis=-1), sine_i / -optics.dot(out, n), rtol=1e-12)
-    same = optics.refract_column_stable(d, dd, n, dn, np.ones(2000), np.zeros(2000))
-    np.testing.assert_array_equal(same, dd)
 
 
 def test_columns_are_derivatives() -> None:
@@ -164,36 +132,6 @@ def test_columns_through_a_smooth_ball_match_differences(height: float) -> None:
     columns_against_differences(ball_over_floor(3), [0.11, height, 5], [0.02, 0.05, -1], 1.5168)
 
 
-def test_a_tessellated_ball_converges_to_the_ball() -> None:
-    exact = sphere((0, 0, 2), 1)
-    glass = Index(1.5168, np.array([0.0, 1.0]))
-    errors = np.zeros((4, 2))
-    for x in (0.1, 0.23, 0.37, 0.52):
-        start = make_ray([x, 0.2, 5], [0, 0, -1], [[1, 0, 0], [0, 0, 0]])
-        ball = through(through(start, exact, AIR, glass), exact, glass, AIR, root=1)
-        floor = onto(ball, Plane((0, 0, 0), (0, 0, 1)))
-        for level in range(4):
-            landed = trace(start, ball_over_floor(level + 2), [glass]).ray
-            errors[level, 0] += np.linalg.norm(landed.position - floor.position)
-            errors[level, 1] += np.linalg.norm(landed.dposition - floor.dposition)
-    # Three halvings: positions gain 64 (second order), columns 8 (the normal's slope is per facet).
-    assert errors[0, 0] > 30 * errors[-1, 0]
-    assert errors[0, 1] > 4 * errors[-1, 1]
-    assert errors[-1, 0] < 2e-3
-
-
-def test_reflection_on_request_and_its_fresnel_share() -> None:
-    scene = TriangleList(*prism())
-    n = float(glasses.index("N-BK7", glasses.D_NM))
-    ray = make_ray([-0.3, 0.1, 1.5], [0, 0, -1])  # starts inside, meets the base head-on
-    straight, mirrored = trace(ray, scene, [Index(n)]), trace(ray, scene, [Index(n)], reflect_at=[0], max_depth=0)
-    head_on = ((n - 1) / (n + 1)) ** 2
-    assert straight.landed and straight.transmittance == pytest.approx(1 - head_on, rel=1e-12)
-    assert mirrored.ray.direction == pytest.approx([0, 0, 1])
-    assert mirrored.transmittance == pytest.approx(head_on, rel=1e-12)
-    assert not mirrored.landed and mirrored.reflections == (True,)
-
-
 def closed_form(
     points: np.ndarray, p0: np.ndarray, v: np.ndarray, covariance: np.ndarray, band: tuple[float, float]
 ) -> np.ndarray:
@@ -222,14 +160,6 @@ def test_swept_gaussian_equals_the_closed_form_and_keeps_the_flux() -> None:
     assert swept_gaussian(grid, p0, v, covariance, band, nodes=40, pieces=2).sum() * 0.01 == pytest.approx(
         2.5, rel=1e-6
     )
-
-
-def test_texel_average_of_a_gaussian_is_a_difference_of_erfs() -> None:
-    from math import erf
-
-    average = texel_average(lambda p: gaussian(p, np.zeros(2), 0.04 * np.eye(2)), np.array([[0.3, 0.1]]), 1.0)
-    part = [0.5 * (erf((c + 0.5) / 0.2 / 2**0.5) - erf((c - 0.5) / 0.2 / 2**0.5)) for c in (0.3, 0.1)]
-    assert average[0] == pytest.approx(part[0] * part[1], rel=1e-8)
 
 
 @pytest.mark.parametrize("throws_back", [False, True])

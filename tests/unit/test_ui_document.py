@@ -81,21 +81,6 @@ material = { kind = "diffuse", colour = 0.8 }   # white
 """
 
 
-@pytest.mark.parametrize("name", ["mine.toml", "other.toml", "beside/other.toml", "taken.toml"])
-def test_one_edit_changes_one_line_of_what_a_person_wrote(tmp_path: Path, name: str) -> None:
-    """Also under another name, and also where another scene stood there."""
-    file = tmp_path / "mine.toml"
-    file.write_text(MINE, encoding="utf-8")
-    (tmp_path / "beside").mkdir()
-    (tmp_path / "taken.toml").write_text("# Of somebody else\n" + SCENE, encoding="utf-8")
-    document = Document.open(file)
-    card = document.scene.objects[1]
-    tinted = replace(card, material=replace(card.material, reflectance_rgb=(0.35, 0.8, 0.8)))
-    document.history.push("Reflectance", replace(document.scene, objects=(document.scene.objects[0], tinted)))
-    target = document.save(tmp_path / name)
-    assert target.read_text(encoding="utf-8") == MINE.replace("colour = 0.8", "colour = [0.35, 0.8, 0.8]")
-
-
 def test_another_key_in_braces_keeps_their_blanks_and_words(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(MINE, encoding="utf-8")

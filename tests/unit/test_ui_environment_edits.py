@@ -147,16 +147,6 @@ def test_a_panorama_without_units_is_made_to_suit_the_lights_and_another_takes_i
         environment.set_environment_map(scene, Path("nothing.hdr"))
 
 
-def test_what_was_edited_can_be_saved(with_map: Scene, picture: Path, tmp_path: Path) -> None:
-    worn = environment.set_texture(environment.set_map_rotation(with_map, 25.0), table_of(with_map), picture, "clamp")
-    save_scene(worn, tmp_path / "saved.toml")
-    again = load_scene(tmp_path / "saved.toml")
-    np.testing.assert_allclose(again.environment.rgb, worn.environment.rgb, rtol=1e-5)
-    np.testing.assert_allclose(again.environment.world_to_local, worn.environment.world_to_local, atol=1e-9)
-    texture = again.objects[table_of(again)].material.texture
-    assert texture.wrap == "clamp" and np.array_equal(texture.rgb, worn.objects[table_of(worn)].material.texture.rgb)
-
-
 def test_a_picture_is_worn_tinted_shared_and_taken_off(scene: Scene, picture: Path) -> None:
     table = table_of(scene)
     worn = environment.set_texture(scene, table, picture)
