@@ -86,10 +86,11 @@ def polygons_of(leaves: list[Leaves], scene: BeamScene, light: int, unit: float)
     leaf = leaf[exists]
     x = leaf["x"]
     places = t[:, 0], 0.5 * t.sum(axis=1), t[:, 1]
+    from_behind = np.einsum("nk,nk->n", leaf["ray"][:, 1, 1, 0], scene.facets["plane"][leaf["facet"], :3]) > 0.0
     density = np.stack([parabola_at(leaf["density"], place) for place in places], axis=1)
     return BeamPolygons(
         np.full(len(t), light, np.int32),
-        scene.facets["receiver"][leaf["facet"]].astype(np.int32),
+        (scene.facets["receiver"][leaf["facet"]] + from_behind).astype(np.int32),
         leaf["source"].astype(np.int32),
         leaf["depth"].astype(np.int32),
         x[:, 0] + t[:, 0] * (x[:, 2] - x[:, 0]),

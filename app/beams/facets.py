@@ -385,7 +385,7 @@ def _facets(
         edge /= np.linalg.norm(edge, axis=1)[:, None]
         record["edge"][: len(outline)] = np.concatenate([edge, np.cross(outline, edge)], axis=1)
         record["centre"], record["radius"] = middle, np.linalg.norm(shifted, axis=1).max()
-        record["receiver"] = receivers.index(i) if record["kind"] == RECEIVER else -1
+        record["receiver"] = 2 * receivers.index(i) if record["kind"] == RECEIVER else -1
         record["frame"] = middle, along, np.cross(normal, along)
         if record["receiver"] in frames:
             origin, axes = frames[int(record["receiver"])]

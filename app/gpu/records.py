@@ -69,7 +69,7 @@ def photon_record(groups: int, hero: bool = False, packs: bool = False, charts: 
             Field("throughput", "vec3", "weight of the light's power at x_lo, x_anchor, x_hi", 1, "columns 19"),
             Field("x_anchor", "float", "spectral coordinate of the traced path", 1, "unit 21"),
             Field("triangle", "uint", "global index of the receiver's triangle", 1, "" if charts else "= 0u"),
-            Field("receiver", "uint", "index of the receiver", 1, "whole 16"),
+            Field("receiver", "uint", "number of the receiver's side", 1, "whole 16"),
             Field("photon_id", "uint", "index on the emission lattice of the pass"),
             Field("light_and_source", "uint", "bits 0-7 light, 8-15 spectral band of the pass, 16-31 object first met"),
             Field("branch_key", "uint", "hash of the choices of the path"),

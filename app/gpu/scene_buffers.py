@@ -86,7 +86,8 @@ class SceneBuffers:
         self.axis = axis
         self.space = GpuSpace.of(scene)
         self.groups = Groups.of(scene, features)
-        self.receivers = [i for i, o in enumerate(scene.objects) if o.material.receives]
+        self.receivers = [i for i, o in enumerate(scene.objects) if o.material.receives for _ in range(2)]
+        """Object of each side of a receiver: the front, where the mesh's normal points, then the back."""
         self.traced_glasses = [o.material.dispersions for o in scene.objects]
         """Each object's glasses as the records number them, whatever `scene` is replaced by to be shown."""
         self.world_meshes = WorldMeshes(scene)

@@ -51,7 +51,11 @@ OBJECT = Struct(
         Field(
             "stack_bit", "uint", "bit of this solid in a ray's inside mask, by priority; NONE where it overlaps nothing"
         ),
-        Field("receiver", "uint", "receiver index; dielectric, polariser: texel of its Crystal; or NONE"),
+        Field(
+            "receiver",
+            "uint",
+            "number of its front, its back's is next; dielectric, polariser: texel of its Crystal; or NONE",
+        ),
         Field("group", "uint", "spectral group of the glass, or NONE"),
         Field("first_triangle", "uint", "global source index of its first triangle"),
         Field(

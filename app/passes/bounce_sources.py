@@ -21,11 +21,9 @@ from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from ..gpu.schema import Field, Struct
 from ..gpu.texture_store import TextureStore, place_defines
-from ..model.contacts import world_bounds
 from ..model.optics.colorimetry import VISIBLE_NM, rgb_basis, xyz_to_rgb709, xyz_to_rgb709_matrix
 from ..model.optics.spectrum import Spectrum
 from ..model.scene import Light, Scene
-from ..model.scene_checks import contains
 from .camera_records import CAMERA_LIGHT, light_record
 from .caustic_maps import CausticMaps
 from .environment_places import PLACE, EnvironmentPlaces
@@ -35,8 +33,6 @@ SAMPLES, SAMPLES_OF_EXTENT = 16, 64
 """Shadow rays a place and light: over the place; over a light of some extent as well."""
 _AT_ONCE = 8
 """Samples of one dispatch."""
-_FLAT = 1e-4
-"""Height above a receiver below which what casts light on it is taken to touch it."""
 _GROUP = 64
 _BIND_PLACES, _BIND_LIGHTS, _BIND_GAINS, _BIND_SOURCES, _BIND_RECEIVERS, _BIND_PLACEMENTS, _BIND_PICTURES = range(8, 15)
 _UNIT_PICTURES = 10
@@ -110,7 +106,6 @@ class BounceSources:
         named |= self._worn.defines
         structs = (*SCENE_STRUCTS, PLACE, RECEIVER, PLACEMENT, CAUSTIC_PARAMETERS, SOURCE, *self._worn.structs)
         self._lookups = shader.compute(self._ctx, "light/bounce_caustic.comp", named, structs)
-        self._may_be_lit = _faces_specular(buffers, places)
         self._no_maps = CausticMaps.without_light(self._ctx, len(buffers.receivers), 1)
         self._caustic, self._paint = self._looked_up(self._no_maps, MapChannels())
 
@@ -168,7 +163,7 @@ class BounceSources:
             maps.textures[target].use(location=0)
             self._run(self._lookups)
         found = np.frombuffer(self._sources.read(), SOURCE.dtype)[: self._count]
-        return found["caustic"].astype(float) * self._may_be_lit[:, None], found["paint"].astype(float)
+        return found["caustic"].astype(float), found["paint"].astype(float)
 
     def reflectance(self, scene: Scene) -> np.ndarray:
         """Light at every place, float64 (n, 3), linear Rec.709."""
@@ -232,27 +227,3 @@ def _colours_of(channels: MapChannels) -> list[np.ndarray]:
         return [np.concatenate([xyz_to_rgb709_matrix().T, np.zeros((1, 3))])]
     rgb = Channels(channels.edges_nm).to_rgb709(np.eye(channels.columns)).astype(float)
     return list(rgb.reshape(-1, 4, 3))
-
-
-def _faces_specular(buffers: SceneBuffers, places: EnvironmentPlaces) -> np.ndarray:
-    """bool (n,): some glass, mirror or grating is on the side of its receiver that a place is on. Maps do not know
-    from which side their light came; where all specular objects are on one side, it was from there."""
-    scene, objects, backs = buffers.scene, places.places["object"], places.places["inside"] != 0
-    specular = [i for i, o in enumerate(scene.objects) if o.material.is_specular]
-    found = np.zeros(len(objects), bool)
-    if not specular:
-        return found
-    for index in buffers.receivers:
-        mesh, item = buffers.world_meshes[index], scene.objects[index]
-        if item.mesh.is_flat:
-            points = np.concatenate([buffers.world_meshes[i].vertices for i in specular])
-            normal, size = mesh.face_normals()[int(np.argmax(mesh.areas()))], np.ptp(points, axis=0).max()
-            height = (points - mesh.vertices[0]) @ normal
-            front, back = (height > _FLAT * size).any(), (height < -_FLAT * size).any()
-        elif mesh.is_closed:
-            within = [contains(item, world_bounds(scene.objects[i]).mean(axis=0)) for i in specular]
-            front, back = not all(within), any(within)
-        else:
-            front = back = True
-        found[objects == index] = np.where(backs[objects == index], back, front)
-    return found

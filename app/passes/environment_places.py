@@ -63,8 +63,8 @@ class EnvironmentPlaces:
 
     size: tuple[int, int]
     records: np.ndarray
-    """float32 (rows, width, 4): for every receiver (first record's texel, records a side, charts' first triangle + 1 or
-    0, sides), then the records."""
+    """float32 (rows, width, 4): for every side of a receiver (first record's texel, records a side, charts' first
+    triangle + 1 or 0, sides), of a back zeros, then the records."""
     places: np.ndarray
     """PLACE (n,)."""
     texel_xy: np.ndarray
@@ -172,7 +172,7 @@ class _Side:
 
 def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = DEFAULT_GUTTER) -> EnvironmentPlaces:
     """All texels of the scene's receivers; `finer`: factor on their number; `gutter`: texels round each chart."""
-    scene, receivers = buffers.scene, buffers.receivers
+    scene, receivers = buffers.scene, buffers.receivers[::2]
     tiles: list[_Side] = []
     # Faces of one object (`model.flat_faces`), which have its name, share its texels.
     areas = [float(mesh.areas().sum()) for mesh in buffers.world_meshes]
@@ -180,7 +180,7 @@ def environment_places(buffers: SceneBuffers, finer: float = 1.0, gutter: int = 
     is_solid = {names[i]: _is_solid(buffers, scene.objects[i].whole) for i in {names[i]: i for i in receivers}.values()}
     of_name = {name: sum(areas[i] for i in receivers if names[i] == name) for name in set(names)}
     share = finer * min(1.0, MOST_TEXELS / (max(len({names[i] for i in receivers}), 1) * (FINE_TEXELS + COARSE_TEXELS)))
-    for receiver, index in enumerate(receivers):
+    for receiver, index in zip(range(0, 2 * len(receivers), 2), receivers, strict=True):
         item, mesh = scene.objects[index], buffers.world_meshes[index]
         sides = (False,) if is_solid[item.name] else (False, True)
         if not item.mesh.is_flat:

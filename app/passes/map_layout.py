@@ -23,11 +23,14 @@ from .landings import Landings
 from .map_atlas import placement_rows
 from .picture_window import PLENTY, PictureWindow, picture_window
 from .plane_frame import PlaneFrame, plane_frame
+from .receiver_sides import faces_camera, is_back, on_both
 
 if TYPE_CHECKING:
     from ..model.geometry.charts import ChartAtlas
 
 MIN_TILE = 32
+_UNSEEN_TILE = 64
+"""Longest side, texels, of the map of a side that pilot photons did not meet and the camera does not look at."""
 LEVEL_STEPS = (1, 2, 4, 8, 16, 32, 64)
 """Texel widths in which every window is kept: broad splats go to the wider ones (footprint.comp). A window on a
 picture's pixels has whole pixels second, and wider ones from there on (`steps_of`)."""
@@ -78,6 +81,8 @@ _SHRINK = 0.85
 """Factor by which maps that do not fit a texture are made coarser until they do."""
 _LEAST_TEXELS_PER_PIXEL = 0.5
 """Maps are not made coarser than this to fit a texture."""
+_NOWHERE = np.array([[0.0, 0.0, 0.0, -1e6]] * 2)
+"""Places in a map that nothing touches."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,7 @@ class Window:
 @dataclass(frozen=True)
 class MapLayout:
     """Everything the atlas and the lookups need; `tiles[receiver]` lists each window's finest texels, fine window
-    first."""
+    first. A bake's has no more than the fronts, whose maps hold what lands on either side."""
 
     size: tuple[int, int]
     placements: np.ndarray
@@ -119,7 +124,7 @@ class MapLayout:
         """What a receiver's finest map resolves, scene units: a texel's side, or half a pixel's where texels are
         smaller than that. These are so only that outlines cut them in smaller parts."""
         side = float(np.sqrt(self.placements["texel_area"][self.receivers[receiver]["placement"]]))
-        window = next(iter(self.windows[receiver]), None)
+        window = next(iter(self.windows.get(receiver, ())), None)
         return side * max(1.0, window.per_pixel / PLENTY) if isinstance(window, PictureWindow) else side
 
 
@@ -137,7 +142,7 @@ def layout_maps(
 
     `picture`: (width, height) whose camera decides resolution and what is in view; with `map_receiver`
     that receiver's one window has exactly this size instead and the camera is ignored; it just holds `window`
-    (n, 3), GPU space, then.
+    (n, 3), GPU space, then, and all maps hold both sides.
     Raises `UserError` where even coarse maps do not fit.
     """
     while True:
@@ -162,25 +167,32 @@ def _layout_maps(
     sizes: list[tuple[int, int]] = []
     seen: dict[int, Window | None] = {}
     plans: list[tuple[int, PlaneFrame | None, list[Window | PictureWindow], ChartAtlas | None]] = []
+    if map_receiver is not None:
+        landings = on_both(landings)
     for receiver, object_index in enumerate(buffers.receivers):
         item = scene.objects[object_index]
+        if map_receiver is not None and is_back(receiver):
+            continue
         points = buffers.space.to_gpu(buffers.world_meshes[object_index].vertices)
         landed = landings.get(receiver)
         if item.mesh.is_flat:
             frame = plane_frame(points)
             extent = extent_of(frame.project(points))
             windows: list[Window | PictureWindow]
+            looked_at = map_receiver is None and faces_camera(scene.camera, buffers, receiver)
             if receiver == map_receiver and given is not None:
                 windows = [extent_of(frame.project(given))]
             elif receiver == map_receiver:
                 around = extent if landed is None else _at_least(known_windows(frame, extent, landed)[0], 0.0, extent)
                 windows = [_with_aspect(around, picture)]
+            elif map_receiver is None and landed is None and not looked_at:
+                windows = [] if item.whole.mesh.is_closed else [replace(extent, largest=_UNSEEN_TILE)]
             else:
-                seen_in = None if map_receiver is not None else picture
+                seen_in = picture if looked_at else None
                 seen[receiver] = None if seen_in is None else visible(scene.camera, buffers, frame, picture)
                 windows = _flat_windows(scene.camera, buffers, frame, extent, landed, seen_in, seen[receiver], fineness)
             for level, window in enumerate(windows):
-                largest = fineness.coarse if level else fineness.fine
+                largest = fineness.fine if looked_at and not level else fineness.coarse
                 if isinstance(window, PictureWindow):
                     size = window.texels
                 elif window.largest is not None:
@@ -191,6 +203,8 @@ def _layout_maps(
                     size = _tile_size(scene.camera, buffers, frame, window, picture, largest, fineness.texels_per_pixel)
                 sizes += [(-(-size[0] // step), -(-size[1] // step)) for step in steps_of(window)]
             plans.append((receiver, frame, windows, None))
+        elif landed is None and is_back(receiver) and item.mesh.is_closed:
+            plans.append((receiver, None, [], None))
         else:
             lit = landed is not None or receiver == map_receiver
             side = int(np.clip(picture[0], 256, 1024)) if lit else 64
@@ -213,7 +227,7 @@ def _place(
     reflectance_class: dict[int, int],
 ) -> MapLayout:
     placements: list[np.ndarray] = []
-    receivers = RECEIVER.zeros(len(plans))
+    receivers = RECEIVER.zeros(len(buffers.receivers))
     tile_of: dict[int, list[Tile]] = {}
     charts: dict[int, ChartAtlas] = {}
     folds: list[tuple[Tile, Tile, int]] = []
@@ -226,11 +240,14 @@ def _place(
         record["first_triangle"] = buffers.first_triangle[object_index]
         record["reflectance_class"] = reflectance_class[receiver]
         record["reflectance_rgb"] = 1.0 if material.reflectance is not None else material.reflectance_rgb
-        levels = [tiles[next_tile + i] for i in range(max(1, len(LEVEL_STEPS) * len(windows)))]
+        levels = tiles[next_tile : next_tile + (1 if atlas is not None else len(LEVEL_STEPS) * len(windows))]
         next_tile += len(levels)
         own = levels[:: len(LEVEL_STEPS)] if windows else levels
         tile_of[receiver] = own
-        if atlas is None:
+        if atlas is None and not windows:
+            placements.append(placement_rows(Tile(0, 0, 0, 0), _NOWHERE, 1e30))
+            count += 1
+        elif atlas is None:
             assert frame is not None
             for level, window in enumerate(windows):
                 of_window = levels[level * len(LEVEL_STEPS) : (level + 1) * len(LEVEL_STEPS)]
@@ -253,6 +270,8 @@ def _place(
             placements.append(placement_rows(own[0], rows, atlas.texel_area, atlas.triangle_rects))
             count += len(atlas.rows)
             charts[receiver] = atlas
+    if len(plans) < len(receivers):
+        receivers[1::2] = receivers[::2]
     return MapLayout(
         size,
         np.concatenate(placements) if placements else PLACEMENT.zeros(1),

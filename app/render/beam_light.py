@@ -34,6 +34,7 @@ from ..passes.landings import Landings
 from ..passes.map_atlas import KIND_PICTURE
 from ..passes.map_layout import MapLayout
 from ..passes.plane_frame import plane_frame
+from ..passes.receiver_sides import is_back
 from ..passes.trace import FluxTally
 from .beam_drawing import BeamDrawing
 from .beam_worker import BeamWorker
@@ -234,13 +235,14 @@ class BeamLight:
         self._coarse = None
 
     def _texels(self, layout: MapLayout, photons: float = 0.0) -> dict[int, float]:
-        """Sides of texels by receiver, scene units, as bands are to be narrow for a pass of so many photons."""
-        texels = {}
+        """Sides of texels by receiver's front, scene units, as bands are to be narrow for a pass of so many photons."""
+        texels: dict[int, float] = {}
         share = max(_PICTURE_SHARE * min(1.0, _SHARE_PHOTONS / max(photons, 1.0)), _LEAST_SHARE)
         for r in self.frames:
             record = layout.placements[layout.receivers[r]["placement"]]
             finer = share if record["kind"] == KIND_PICTURE else 1.0
-            texels[r] = finer * layout.resolved_width(r) * self._buffers.space.scale
+            front, side = r - is_back(r), finer * layout.resolved_width(r) * self._buffers.space.scale
+            texels[front] = min(texels.get(front, side), side)
         return texels
 
     def begin(self) -> None:

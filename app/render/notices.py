@@ -19,6 +19,7 @@ from ..passes.gathered_light import MAX_EVENTS
 from ..passes.map_layout import Window, pixel_side, project
 from ..passes.picture_window import PictureWindow
 from ..passes.plane_frame import plane_frame
+from ..passes.receiver_sides import faces_camera
 from ..passes.texel_map import TexelMap
 from .light_pass import LightPass
 from .light_stats import LightStats
@@ -136,7 +137,7 @@ def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, 
         return []
     expected, held = 0.0, 0.0
     for receiver in light.survey.lit_receivers:
-        if light.layout.windows[receiver]:
+        if light.layout.windows[receiver] and faces_camera(camera, light.buffers, receiver):
             found = _pixels_of(light, receiver, camera, settings)
             about = np.zeros(rgb.shape[:2], bool)
             for row, column in found:

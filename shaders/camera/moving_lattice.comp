@@ -44,7 +44,8 @@ Look look_at(uvec2 pixel) {
         WavelengthInterval interval = wavelength_interval(path, path.band.x, path.band.z);
         add_direct(path, seen, interval, 0u, no_steady_lights());
         if (RECEIVER_LIGHT) add_receiver_light(path, seen, interval);
-        bool covered = find_texel(thing.receiver, facet.source, seen.position, placement, texel);
+        uint receiver = side_met(thing, seen.direction, seen.normal_g);
+        bool covered = find_texel(receiver, facet.source, seen.position, placement, texel);
         if (!covered) placement = NONE;
         if (p.orthographic == 0u) depth = dot(seen.position - p.position, p.forward);
         ivec3 facing = ivec3(round(32.0 * hit.normal_g));

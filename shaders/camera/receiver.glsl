@@ -426,7 +426,7 @@ void add_caustic_at(
 void add_caustic(Path path, SurfaceInteraction seen, WavelengthInterval interval) {
     uint placement;
     vec3 texel;
-    uint receiver = object_at(seen.object).receiver;
+    uint receiver = side_met(object_at(seen.object), seen.direction, seen.normal_g);
     bool covered = find_texel(receiver, seen.source, seen.position, placement, texel);
     if (covered) add_caustic_at(path, seen, interval, receiver, placement, texel);
 }

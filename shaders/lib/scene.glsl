@@ -53,6 +53,11 @@ Object object_at(uint object) {
     return Object_FROM(scene_texel, at);
 }
 
+// Number of the side of a receiver that something along `direction` meets.
+uint side_met(Object thing, vec3 direction, vec3 normal_g) {
+    return thing.receiver + uint(dot(direction, normal_g) > 0.0);
+}
+
 // Unit normal of a smooth facet's corner; `Triangle.normals` is the first of three.
 vec3 corner_normal(uint corner) { return uintBitsToFloat(scene_texel(uint(NORMALS_AT) + corner).xyz); }
 

@@ -45,8 +45,8 @@ void main() {
         vec2 within = (vec2(part % PLACE_PARTS, part / PLACE_PARTS) + 0.5) / float(PLACE_PARTS) - 0.5;
         uint placement;
         vec3 at;
-        bool covered = find_texel(
-            thing.receiver, source, place.position + within.x * place.span_u + within.y * place.span_v, placement, at);
+        vec3 position = place.position + within.x * place.span_u + within.y * place.span_v;
+        bool covered = find_texel(thing.receiver + place.inside, source, position, placement, at);
         if (covered) {
             Placement window = placements[placement];
             vec2 box = (abs(texels_along(window, at, place.span_u)) + abs(texels_along(window, at, place.span_v)))

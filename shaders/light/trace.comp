@@ -152,7 +152,7 @@ void land(Arrival at, uint slot, inout Outcome outcome) {
     }
     photon.x_anchor = path.band.y;
     photon.triangle = at.facet.source;
-    photon.receiver = at.thing.receiver;
+    photon.receiver = side_met(at.thing, path.direction, hit.normal_g);
     photon.photon_id = path.walk.photon_id;
     photon.light_and_source = path.walk.light_and_source;
     photon.branch_key = path.walk.branch_key;

@@ -85,10 +85,9 @@ def test_charts_have_a_placement_a_triangle(gl):
     placements = np.frombuffer(maps.placements.read(), PLACEMENT.dtype).copy()
     placements["kind"], placements["next"] = 1, NONE
     maps.placements.write(placements.tobytes())
-    receivers = RECEIVER.zeros(2)
-    receivers["placement"] = NONE, 0
-    receivers["kind"] = 0, 1
-    receivers["first_triangle"] = 0, 2
+    receivers = RECEIVER.zeros(4)
+    receivers["placement"] = NONE, NONE, 0, NONE
+    receivers["kind"][2], receivers["first_triangle"][2] = 1, 2
     maps = replace(maps, receivers=gl.ctx.buffer(receivers.tobytes()))
     camera_pass.run(ABOVE, 32, 32, 1, maps=maps)
     x, y = np.moveaxis(floor_points((32, 32), ABOVE)[..., :2], -1, 0)

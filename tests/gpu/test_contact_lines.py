@@ -105,7 +105,7 @@ def test_a_face_just_behind_a_wall_does_not_hide_it_from_within_the_glass(gl) ->
     projection that begins at the camera tells such distances no longer."""
     pool = load_scene(assets_dir() / "scenes" / "underwater.toml")
     with light_pass(gl, pool, replace(SETTINGS, width=1280, height=720, photons=2_000)) as (light, _):
-        wall = 1  # of the receivers: floor, far wall, …
+        wall = 2  # of the receivers: floor, its back, far wall, …
         tile = light.layout.tiles[wall][0]
         words = read_words(light.maps.atlas.contact_words)[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
     wall_round_it = uniform_filter(((words & 0xFFFF) == 0xFFFF).astype(float), 9)

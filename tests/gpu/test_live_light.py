@@ -176,7 +176,7 @@ def test_edited_dispersion_is_what_a_rendering_of_the_edited_glass_shows(gl: Con
         trace(fresh, 100_000)
         expected = into(light, fresh)
         # A texel of the window beyond the others is a hundred times as large, and holds as much more.
-        ((tile, *_),) = light.light_pass.layout.tiles.values()
+        (tile, *_), _back = light.light_pass.layout.tiles.values()
         own = np.s_[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
         followed, expected = followed[own], expected[own]
         blocks = [

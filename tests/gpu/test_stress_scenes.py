@@ -139,7 +139,7 @@ def test_moved_scenes_are_the_same_scene() -> None:
     assert large.lights[0].radius == pytest.approx(10.0 * BEAM.radius)
     assert np.linalg.norm(large.lights[0].direction) == pytest.approx(1.0)
     assert large.lights[0].spectral_power == scene.lights[0].spectral_power
-    assert np.allclose(large.camera.position, (1.0, 2.0, 3.0 - 50.0))
+    assert np.allclose(large.camera.position, (1.0, 2.0, 3.01))
     lamp = PointLight(BEAM.name, BEAM.spectral_power, BEAM.position)
     assert np.allclose(
         moved(replace(scene, lights=(lamp,)), 10.0).lights[0].spectral_power.density,

@@ -13,14 +13,14 @@ from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import Camera, Scene
 from spectrasplat.stress.rigs.probe import SMALL, picture_error, probe
-from spectrasplat.stress.rigs.scene_parts import FROM_BELOW, at, solid, stage
+from spectrasplat.stress.rigs.scene_parts import UNDER_GLASS, at, solid, stage
 
 CAUSTIC = replace(SMALL, layer="caustic", method="srd")
-PIXEL = FROM_BELOW.vertical_extent / SMALL.height
-ASLANT = Camera((0.0, -4.0, -5.0), (0.0, 0.0, 0.0), vertical_fov_deg=40.0)
+PIXEL = UNDER_GLASS.vertical_extent / SMALL.height
+ASLANT = Camera((0.0, -5.0, 5.0), (0.0, 0.0, 0.0), vertical_fov_deg=36.0)
 
 
-def beam(pixels: float, camera: Camera = FROM_BELOW) -> Scene:
+def beam(pixels: float, camera: Camera = UNDER_GLASS) -> Scene:
     """One lumen straight down through a block, in a beam so many pixels wide."""
     radius = 0.5 * pixels * PIXEL
     light = CollimatedLight(

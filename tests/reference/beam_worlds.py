@@ -49,7 +49,7 @@ class Rig:
     def __post_init__(self) -> None:
         self.meshes = [o.mesh.transformed(o.object_to_world) for o in self.scene.objects]
         self.axis = SpectralAxis.build([o.material.dispersion for o in self.scene.objects if o.material.dispersion])
-        self.receivers = [i for i, o in enumerate(self.scene.objects) if o.material.receives]
+        self.receivers = [i for i, o in enumerate(self.scene.objects) if o.material.receives for _ in range(2)]
         self.frames = {}
         for number, i in enumerate(self.receivers):
             if self.scene.objects[i].mesh.is_flat:

@@ -15,7 +15,7 @@ from spectrasplat.model.geometry.mesh import Mesh, note_recipe
 from spectrasplat.model.scene import Dielectric, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.scene_surfaces import as_triangles
-from spectrasplat.stress.rigs.scene_parts import BEAM, FLINT, FROM_BELOW, TABLE
+from spectrasplat.stress.rigs.scene_parts import BEAM, FLINT, TABLE, UNDER_GLASS
 
 GLASS = Dielectric(FLINT)
 CYLINDER = [[0.0, -0.3], [0.4, -0.3], [0.4, 0.3], [0.0, 0.3]]
@@ -36,7 +36,7 @@ def placed(mesh: Mesh, at: tuple[float, float, float] = (0.0, 0.0, 2.0), materia
 
 
 def scene_of(*objects: SceneObject) -> Scene:
-    return Scene("test", FROM_BELOW, (BEAM,), (TABLE, *objects))
+    return Scene("test", UNDER_GLASS, (BEAM,), (TABLE, *objects))
 
 
 SHAPES = {

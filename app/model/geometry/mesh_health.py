@@ -174,10 +174,10 @@ def examine(mesh: Mesh) -> MeshHealth:
 def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> tuple[Mesh, tuple[str, ...]]:
     """Mend what can be mended without a guess, and say in one sentence each what was done or assumed.
 
-    Welds vertices at equal positions and seams that gape by rounding, drops triangles without area, turns an
-    inside-out solid, and replaces zero shading normals by the face's. Open, non-manifold and inconsistently wound
-    meshes are kept, with a warning where the mesh is to be `solid` (a table may well be open). Raises UserError when
-    nothing but degenerate triangles is left.
+    Welds vertices at equal positions and seams that gape by rounding, drops triangles without area, winds what lies in
+    one plane one way, turns an inside-out solid, and replaces zero shading normals by the face's. Open, non-manifold
+    and inconsistently wound meshes are kept, with a warning where the mesh is to be `solid` (a table may well be open).
+    Raises UserError when nothing but degenerate triangles is left.
     """
     health = health or examine(mesh)
     notes: list[str] = []
@@ -197,6 +197,9 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
         normals = np.where(zero[..., None], mesh.face_normals()[:, None], mesh.corner_normals)
         mesh = replace(mesh, corner_normals=normals)
         notes.append(f"{label}: {count_of(health.zero_normals, 'zero normal')} replaced by the face normal")
+    if health.inconsistent_edges and mesh.is_flat:
+        mesh = _wound_alike(mesh)
+        health = examine(mesh)
     if health.inside_out:
         mesh = mesh.flipped()
         mesh, _ = _with_agreeing_normals(mesh)
@@ -211,6 +214,24 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
     return make_mesh(
         mesh.name, mesh.vertices, mesh.triangles, mesh.corner_normals, mesh.uv, mesh.source, mesh.uv_unwraps
     ), tuple(notes)
+
+
+def _wound_alike(mesh: Mesh) -> Mesh:
+    """A flat mesh all of whose triangles face as the largest does."""
+    normals = mesh.face_normals()
+    turned = (normals @ normals[int(np.argmax(mesh.areas()))] < 0.0)[:, None]
+    other = mesh.flipped()
+    corners = (
+        None
+        if mesh.corner_normals is None or other.corner_normals is None
+        else (mesh.corner_normals, other.corner_normals)
+    )
+    return replace(
+        mesh,
+        triangles=np.where(turned, other.triangles, mesh.triangles),
+        corner_normals=None if corners is None else np.where(turned[..., None], corners[1], corners[0]),
+        uv=None if mesh.uv is None or other.uv is None else np.where(turned[..., None], other.uv, mesh.uv),
+    )
 
 
 def forms_of(meshes: Sequence[Mesh]) -> list[str]:

@@ -27,6 +27,7 @@ from ...model.optics.glass import LINE_D_NM
 from ...model.optics.spectrum import Spectrum
 from ...model.scene import Scene, SceneObject
 from ...model.settings import RenderSettings
+from ...passes.receiver_sides import faces_camera
 from ..bake import check_receiver
 from ..frames import FrameRenderer
 from ..lit_receiver import up_of
@@ -223,7 +224,7 @@ def _tracing(
 
 
 def _receiver(light: TracedLight, name: str | None) -> int:
-    """Number of the receiver called so, or of that on which most light lands."""
+    """Number of the receiver called so, or of that on which most light lands: of the side that the camera looks at."""
     objects = light.scene.objects
     numbers = [
         r
@@ -231,9 +232,11 @@ def _receiver(light: TracedLight, name: str | None) -> int:
         if name == objects[i].name or (name is None and _why_not(objects[i]) is None)
     ]
     if not numbers:
-        whys = "; ".join(filter(None, (_why_not(objects[i]) for i in light.buffers.receivers)))
+        whys = "; ".join(filter(None, (_why_not(objects[i]) for i in light.buffers.receivers[::2])))
         raise UserError(f"no caustic of this scene can be on a page: {whys or 'nothing in it is diffuse'}")
-    return max(numbers, key=light.landed)
+    landed = {r: light.landed(r) for r in numbers}
+    shown = [r for r in numbers if landed[r] > 0.0 and faces_camera(light.scene.camera, light.buffers, r)]
+    return max(shown or numbers, key=lambda r: landed[r])
 
 
 def _still(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...edit.stored_photons import StoredPhotons
+from ...passes.receiver_sides import faces_camera
 from .invalidation import shown_glasses
 
 if TYPE_CHECKING:
@@ -27,9 +28,14 @@ MOST_ERROR = 0.2
 
 
 def world_photons(light: LiveLight, inputs: LiveInputs, limit: int) -> StoredPhotons:
-    """About `limit` stored records of `light`, as `inputs` shows them (without the brush's local gain)."""
-    records = light.stored_records(limit)
-    buffers = light.buffers
+    """About `limit` stored records of `light`, as `inputs` shows them (without the brush's local gain): of flat
+    receivers those on the side that its camera looks at."""
+    records, buffers = light.stored_records(limit), light.buffers
+    objects = light.light_pass.scene.objects
+    shown = [
+        not objects[i].mesh.is_flat or faces_camera(inputs.camera, buffers, r) for r, i in enumerate(buffers.receivers)
+    ]
+    records = records[np.array(shown, bool)[records["receiver"].astype(int)]]
     space, axis, groups = buffers.space, buffers.axis, buffers.groups
     glasses = shown_glasses(light.light_pass.scene, inputs.scene) or {}
     samples = np.linspace(0.0, 1.0, buffers.variable_table.shape[1]) if groups.count else np.zeros(0)
@@ -170,8 +176,6 @@ def _ratio(now: float, then: float) -> float:
 
 def reach_of(light: LiveLight, receiver: int) -> float:
     """Radius that still gathers a few footprints on object `receiver`: some texels of its finest map, world units."""
-    index = light.buffers.receivers.index(receiver)
-    area = float(
-        light.light_pass.layout.placements["texel_area"][light.light_pass.layout.receivers[index]["placement"]]
-    )
+    layout, front = light.light_pass.layout, light.buffers.receivers.index(receiver)
+    area = float(layout.placements["texel_area"][layout.receivers["placement"][front : front + 2]].min())
     return (4.0 if light.light_pass.scene.objects[receiver].mesh.is_flat else 6.0) * area**0.5

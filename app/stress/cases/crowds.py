@@ -22,7 +22,7 @@ from ...model.lights.light import made
 from ...model.materials.absorption import Absorption
 from ...model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, xyz_to_rgb709
 from ...model.optics.glass import from_abbe
-from ...model.scene import Camera, Diffuse, Light, Scene, SceneObject
+from ...model.scene import Diffuse, Light, Scene, SceneObject
 from ...model.scene_checks import MAX_LIGHTS, MAX_OBJECTS
 from ..case import Held, Measured, case
 from ..rigs.probe import (
@@ -36,7 +36,7 @@ from ..rigs.probe import (
     probe,
     rendered,
 )
-from ..rigs.scene_parts import BEAM, CROWN, FLINT, SUN, brighter, solid, stage
+from ..rigs.scene_parts import BEAM, CROWN, FLINT, SUN, UNDER_GLASS, brighter, solid, stage
 from .lights import refused
 
 
@@ -213,7 +213,7 @@ COLOUR = 0.04
 weak beams of the sun's parts play roulette."""
 COUNTED = 0.02
 """Share of the light whose end beams do not count: what a facet absorbs they count by the middle of a band."""
-LOW = Camera((0.0, 0.0, -5.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=2.0)
+LOW = replace(UNDER_GLASS, vertical_extent=2.0)
 
 
 def behind_a_pane(light: Light, height: float, x: float, depth: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from ...model.settings import RenderSettings
 from ...render.still import RenderResult, render
 from ..case import Case, Held, Measured, Measurement, case, judged, measured, not_finite
 from ..rigs.probe import CAUSTIC, energy_error
-from ..rigs.scene_parts import BEAM, FROM_BELOW, SUN, TABLE, at, brighter, moved, solid, stage, tilted, turn
+from ..rigs.scene_parts import BEAM, SUN, TABLE, UNDER_GLASS, at, brighter, moved, solid, stage, tilted, turn
 from .contacts import CONTACT
 
 SAID_FROM = 0.01
@@ -131,7 +131,7 @@ def thin_beams(context: Context, widths: Sequence[float]) -> Measured:
     A window smaller than a pixel falls between camera samples; float32 cannot distinguish its texels."""
     base: np.ndarray | None = None
     for pixels in widths:
-        radius = 0.5 * pixels * FROM_BELOW.vertical_extent / CAUSTIC.height
+        radius = 0.5 * pixels * UNDER_GLASS.vertical_extent / CAUSTIC.height
         spectrum = illuminant("D65").scaled_to_luminous(1.0 / (np.pi * radius**2))
         light = CollimatedLight("beam", spectrum, (0.3137, 0.0711, 6.0), (0.0, 0.0, -1.0), radius=radius)
         result = render(stage(PLACED_BLOCK, lights=[light]), CAUSTIC, context=context)

@@ -20,8 +20,8 @@ from ...model.vectors import vec3
 
 TABLE = SceneObject("table", plane(8.0, 8.0), Diffuse())
 """Receiver in z = 0."""
-FROM_BELOW = Camera((0.0, 0.0, -5.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=4.5)
-"""Sees the table's caustic without any glass before it, on the same pixels whatever is on the table."""
+UNDER_GLASS = Camera((0.0, 0.0, 1e-3), (0.0, 0.0, 0.0), (0.0, -1.0, 0.0), "orthographic", vertical_extent=4.5)
+"""Sees the table's caustic from so near that no glass is before it, on the same pixels whatever is on the table."""
 BEAM = CollimatedLight(
     "beam", illuminant("D65").scaled_to_luminous(10.0), (0.3, 0.0, 6.0), (0.0, 0.0, -1.0), radius=0.45
 )
@@ -70,7 +70,7 @@ def tilted(*items: SceneObject) -> list[SceneObject]:
 
 
 def stage(
-    *objects: SceneObject, lights: Sequence[Light] = (BEAM,), camera: Camera = FROM_BELOW, table: SceneObject = TABLE
+    *objects: SceneObject, lights: Sequence[Light] = (BEAM,), camera: Camera = UNDER_GLASS, table: SceneObject = TABLE
 ) -> Scene:
     """Objects over the table."""
     return Scene("stage", camera, tuple(lights), (*objects, table))
