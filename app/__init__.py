@@ -45,7 +45,6 @@ _OFFERED = (
     "glass",
     "glasses",
     "gradient",
-    "gradients",
     "lens_check",
     "lens_table",
     "load",

@@ -16,7 +16,7 @@ from ..model.optics.lens_design import LensTable
 from ..model.plate_check import PlateReport
 from .catalogue import Glass, glass, glasses
 from .gems import GemFigures, GemReport, gem
-from .gradient import Gradient, gradient, gradients
+from .gradient import Gradient, gradient
 from .lenses import lens_check, lens_table
 from .pages import page
 from .picture import CausticMap, Picture, Statistics
@@ -58,7 +58,6 @@ __all__ = [
     "glass",
     "glasses",
     "gradient",
-    "gradients",
     "lens_check",
     "lens_table",
     "load",

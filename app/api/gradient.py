@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -54,7 +53,7 @@ class Gradient:
     placement: Mapping[str, object] | None
     """Where a map lies, see `CausticMap.placement`."""
     seconds: float
-    """From the call to the result, shared by all that were found together."""
+    """From the call to the result."""
 
     @property
     def codes(self) -> NDArray[np.uint8]:
@@ -96,44 +95,6 @@ def solved(
         return device.run(work, progress, cancel)
 
 
-def gradients(
-    scene: Scene,
-    of: Sequence[str],
-    receiver: str | None = None,
-    *,
-    size: Size = GRADIENT_SIZE,
-    photons: Count | None = None,
-    seed: int | None = None,
-    bins: int | None = None,
-    spp: int | None = None,
-    step: float | None = None,
-    progress: Progress | None = None,
-    cancel: Cancel | None = None,
-) -> list[Gradient]:
-    """`gradient` by several parameters, whose picture is traced once."""
-    settings = settings_of(scene, size=size, photons=photons, seed=seed, bins=bins, spp=spp)
-    if receiver is not None:
-        check_receiver(scene, receiver)
-        settings = replace(settings, layer=f"map:{receiver}")
-    if isinstance(of, str) or not of:
-        raise UserError("of must be a list of paths, such as ['objects.prism.n_d']")
-    if step is not None and not (isinstance(step, int | float) and 0.0 < step < float("inf")):
-        raise UserError(f"step {step!r} is no change of a parameter: give a number above 0")
-    from ..edit.parameters import Stage
-    from ..render.gradient import gradient
-
-    stage, started = Stage(scene._model, scene._model.camera), time.perf_counter()
-    given = dict.fromkeys(of, float(step)) if step is not None else None
-    found = solved(lambda context: gradient(context, stage, settings, list(of), given, noise=True), progress, cancel)
-    base, seconds = (found.base.rgb, found.base.spectral, found.base.bin_edges_nm), time.perf_counter() - started
-    return [
-        Gradient(
-            each.path, each.picture.rgb, each.picture.spectral, *base, each.step, each.noise, found.placement, seconds
-        )
-        for each in found.derivatives
-    ]
-
-
 def gradient(
     scene: Scene,
     of: str,
@@ -155,5 +116,28 @@ def gradient(
     in that bin. `step`: change of the parameter to either side; found where it is not given. Raises `UserError`, also
     where `cancel` stopped it.
     """
-    found = partial(gradients, scene, [of], receiver, size=size, photons=photons, seed=seed, bins=bins, spp=spp)
-    return found(step=step, progress=progress, cancel=cancel)[0]
+    settings = settings_of(scene, size=size, photons=photons, seed=seed, bins=bins, spp=spp)
+    if receiver is not None:
+        check_receiver(scene, receiver)
+        settings = replace(settings, layer=f"map:{receiver}")
+    if step is not None and not (isinstance(step, int | float) and 0.0 < step < float("inf")):
+        raise UserError(f"step {step!r} is no change of a parameter: give a number above 0")
+    from ..edit.parameters import Stage
+    from ..render.gradient import gradient
+
+    stage, started = Stage(scene._model, scene._model.camera), time.perf_counter()
+    steps = None if step is None else {of: float(step)}
+    found = solved(lambda context: gradient(context, stage, settings, [of], steps, noise=True), progress, cancel)
+    (its,), base = found.derivatives, found.base
+    return Gradient(
+        of=of,
+        rgb=its.picture.rgb,
+        spectral=its.picture.spectral,
+        base=base.rgb,
+        base_spectral=base.spectral,
+        bin_edges_nm=base.bin_edges_nm,
+        step=its.step,
+        noise=its.noise,
+        placement=found.placement,
+        seconds=time.perf_counter() - started,
+    )

@@ -115,7 +115,7 @@ def caustic(
         took, count = time.perf_counter() - started, baked.photons
         notices = tuple(baked.notices)
         stats = Statistics(count, count, 0, took, context.renderer, context.is_software, stopped(), notices)
-        picture = baked.picture
+        (picture,) = baked.pictures
         return CausticMap(
             picture.rgb, picture.spectral, picture.bin_edges_nm, stats, receiver, baked.placement, _scene=model
         )

@@ -18,7 +18,7 @@ from .table import Bake, Export
 
 if TYPE_CHECKING:
     from ..model.scene import Scene
-    from ..render.bake import BakedMap
+    from ..render.bake import Drawn
 
 T = TypeVar("T")
 
@@ -51,8 +51,8 @@ def export(options: Export) -> int:
         return _page(options)
     outputs = check_export(options.output, options.plane, options.source)
 
-    def write(scene: Scene, baked: BakedMap) -> None:
-        rgb, where = baked.picture.rgb, baked.placement
+    def write(scene: Scene, baked: Drawn) -> None:
+        rgb, where = baked.pictures[0].rgb, baked.placement
         write_export(scene, options.receiver, rgb, where, options.output, options.plane, options.source)
 
     others = ", ".join(path.name for path in outputs[1:])
@@ -122,7 +122,7 @@ def finished(
 
 
 def _baked(
-    options: Bake | Export, outputs: Sequence[Path], write: Callable[[Scene, BakedMap], None], what: str, where: str
+    options: Bake | Export, outputs: Sequence[Path], write: Callable[[Scene, Drawn], None], what: str, where: str
 ) -> int:
     """Bake, write and say so; returns the exit code. Raises `UserError` for all that can be refused beforehand:
     numbers, memory, files that cannot be written, the scene, its receiver."""

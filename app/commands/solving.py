@@ -12,15 +12,16 @@ from ..base.interrupts import INTERRUPTED, interrupt_flag
 from .bake import finished
 from .opened import note_assumptions, open_scene, settings_for
 from .printing import note, show
-from .solving_table import GRADIENT_SIZE, Fit, Gradient, Match, Wanted
+from .solving_table import GRADIENT_SIZE, Fit, Gradient, Match
 
 if TYPE_CHECKING:
-    from ..edit.solved import Rows
+    from ..edit import solved
     from ..gpu.context import Context
     from ..model.scene import Scene
     from ..render.solving import Solver
 
 T = TypeVar("T")
+Found = TypeVar("Found", bound="solved.Fit | solved.Match")
 _NO_ANSWER = "stopped before there was an answer"
 
 
@@ -67,54 +68,44 @@ def gradient(options: Gradient) -> int:
 
 def match(options: Match) -> int:
     """Rank and list glasses; returns the exit code. Raises `UserError`."""
-    from ..render import light_target
+    from ..render.light_target import glass_called
 
     scene = open_scene(options)
-    index, count = light_target.glass_called(scene, options.through), options.count or 10
-    started = time.perf_counter()
-    found = _solved(options, scene, options.receiver, "comparing glasses", lambda its: its.match(index, count))
-    if found is None:
-        return INTERRUPTED
-    return _told(found.rows(), started)
+    index, count = glass_called(scene, options.through), options.count or 10
+    return _solved(options, scene, "comparing glasses", lambda its: its.match(index, count))
 
 
 def fit(options: Fit) -> int:
     """Find and show numbers of a scene; returns the exit code. Raises `UserError`."""
     if options.target is None and options.width is None:
         raise UserError("there is nothing to fit to: give --target or --width")
-    scene = open_scene(options)
-    started = time.perf_counter()
-    found = _solved(options, scene, options.receiver, "fitting", lambda its: its.fit(options.of))
-    if found is None:
-        return INTERRUPTED
-    return _told(found.rows(), started)
-
-
-def _told(rows: Rows, started: float) -> int:
-    for label, text in rows:
-        show(f"{label:<28} {text}")
-    show(f"in {time.perf_counter() - started:.1f} s")
-    return 0
+    return _solved(options, open_scene(options), "fitting", lambda its: its.fit(options.of))
 
 
 def _solved(
-    options: Wanted, scene: Scene, receiver: str, what: str, work: Callable[[Solver], Generator[float, None, T]]
-) -> T | None:
-    """What `work` finds for the target of `options`; None where it was interrupted. Raises `UserError`."""
+    options: Match | Fit, scene: Scene, what: str, work: Callable[[Solver], Generator[float, None, Found]]
+) -> int:
+    """Show what `work` finds for the target of `options`; returns the exit code. Raises `UserError`."""
     from ..edit.parameters import Stage
     from ..render import light_target
     from ..render.bake import check_receiver
     from ..render.solving import solution
 
-    check_receiver(scene, receiver)
-    ends = [options.begin, options.end, options.last]
-    between = [place for place in ends if place is not None]
+    check_receiver(scene, options.receiver)
+    between = [place for place in (options.begin, options.end, options.last) if place is not None]
     if between and (options.begin is None or options.end is None):
         raise UserError("--begin and --end go together: give both, where the target's first row begins and ends")
     values = None if options.target is None else light_target.read_target(options.target)
     note_assumptions(scene)
-    wish = Stage(scene, scene.camera), settings_for(options, scene), receiver, values, between or None, options.width
-    return _run(scene, what, lambda context: solution(context, *wish, work))
+    wish = settings_for(options, scene), options.receiver, values, between or None, options.width
+    started = time.perf_counter()
+    found = _run(scene, what, lambda context: solution(context, Stage(scene, scene.camera), *wish, work))
+    if found is None:
+        return INTERRUPTED
+    for label, text in found.rows():
+        show(f"{label:<28} {text}")
+    show(f"in {time.perf_counter() - started:.1f} s")
+    return 0
 
 
 def _run(scene: Scene, what: str, steps: Callable[[Context], Generator[float, None, T]]) -> T | None:

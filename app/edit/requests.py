@@ -232,6 +232,13 @@ class CheckPlate(Request):
 
 
 @dataclass(frozen=True)
+class JudgeStone(Request):
+    """Find figures and pictures of the cut stone of that name."""
+
+    name: str
+
+
+@dataclass(frozen=True)
 class CancelJob(Request):
     """Stop the running export; what is finished stays."""
 
@@ -263,6 +270,6 @@ class DismissMessage(Request):
     text: str
 
 
-Solving = MatchGlass | Derive | CheckPlate
+Solving = MatchGlass | Derive | CheckPlate | JudgeStone
 LongExport = RenderPicture | Bake | Animate | Solving
 Export = Screenshot | LongExport

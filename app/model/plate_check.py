@@ -151,13 +151,14 @@ def check_plate(
     ratio = 2.0 if distance is not None else float(_SCAN[1] / _SCAN[0])
     focus = _peak(lambda place: aligned(place).correlation, at / ratio, at * ratio, stopped)
     at = focus if distance is None else distance
-    fit = _refined(*landing(plate, at, LINE_D_NM, flat_first), target, fits.get(at, fit))
-    picture, xy, flux = _shown(plate, at, flat_first, target, fit)
+    xy, flux = landing(plate, at, LINE_D_NM, flat_first)
+    fit = _refined(xy, flux, target, fits.get(at, fit))
+    picture, inside = _shown(xy, flux, target, fit)
     error = _error(picture, target)
 
     def grown(place: float, tilt_deg: tuple[float, float] = (0.0, 0.0)) -> bool:
-        moved = aligned(place, tilt_deg)
-        return _error(_shown(plate, place, flat_first, target, moved, tilt_deg)[0], target) > error + _GROWTH
+        lands = landing(plate, place, LINE_D_NM, flat_first, tilt_deg)
+        return _error(_shown(*lands, target, aligned(place, tilt_deg))[0], target) > error + _GROWTH
 
     tolerances = []
     wanted: tuple[tuple[float, Callable[[float], bool]], ...] = (
@@ -171,11 +172,10 @@ def check_plate(
     ends = [landing(plate, at, nm, flat_first)[0] for nm in (LINE_F_NM, LINE_C_NM)]
     apart = ((ends[0] - ends[1]) ** 2).sum(axis=1)
     lit = float(plate.facets[:, 2].sum())
-    share = _inside(xy, flux, fit, target)
     report(1.0, "")
     width = fit.pixel * target.shape[1]
     passed, blur = float(flux.sum()) / lit, math.sqrt(float((flux * apart).sum() / flux.sum()))
-    shares, (nearer, farther, tilt) = (error, share / lit, passed), tolerances
+    shares, (nearer, farther, tilt) = (error, inside / lit, passed), tolerances
     return PlateReport(plate, flat_first, at, focus, fit, *shares, width, blur, nearer, farther, tilt, picture, target)
 
 
@@ -232,23 +232,11 @@ def _deposited(
     return grid.reshape(h + 2, w + 2)[1:-1, 1:-1]
 
 
-def _inside(xy: np.ndarray, flux: np.ndarray, fit: Fit, target: np.ndarray) -> float:
-    return float(_deposited(xy, flux, _turned(target, fit.turn).shape, fit.pixel, np.array(fit.centre)).sum())
-
-
-def _shown(
-    plate: Plate,
-    distance: float,
-    flat_first: bool,
-    target: np.ndarray,
-    fit: Fit,
-    tilt_deg: tuple[float, float] = (0.0, 0.0),
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The picture as the target is turned, of mean 1, and what `landing` gives."""
-    xy, flux = landing(plate, distance, LINE_D_NM, flat_first, tilt_deg)
-    grid = _smooth(_deposited(xy, flux, _turned(target, fit.turn).shape, fit.pixel, np.array(fit.centre)))
-    mean = float(grid.mean())
-    return _turned_back(grid / mean if mean > 0.0 else grid, fit.turn), xy, flux
+def _shown(xy: np.ndarray, flux: np.ndarray, target: np.ndarray, fit: Fit) -> tuple[np.ndarray, float]:
+    """The picture of light that lands, turned as the target is and of mean 1, and how much light is in it."""
+    light = _deposited(xy, flux, _turned(target, fit.turn).shape, fit.pixel, np.array(fit.centre))
+    grid = _smooth(light)
+    return _turned_back(grid / max(float(grid.mean()), 1e-300), fit.turn), float(light.sum())
 
 
 def _error(picture: np.ndarray, target: np.ndarray) -> float:

@@ -8,7 +8,7 @@ charts, with the texture coordinates of every triangle.
 from __future__ import annotations
 
 import json
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -56,26 +56,54 @@ class BakedMap:
     notices: list[str]
 
 
+@dataclass(frozen=True)
+class Drawn:
+    """Pictures of the same settings, random numbers and texels; of a map the irradiance, see `UNITS`, row 0 on top."""
+
+    pictures: list[Picture]
+    placement: Mapping[str, object]
+    """Of a map; else empty."""
+    window: np.ndarray | None
+    """That holds the same part of a receiver again: see `MapFit.window`."""
+    photons: int
+    notices: list[str]
+
+
+def drawn(
+    context: Context,
+    settings: RenderSettings,
+    fitted: Sequence[Stage],
+    window: np.ndarray | None = None,
+    *others: Stage,
+    stop: Stop = lambda: False,
+) -> Generator[float, None, Drawn]:
+    """What `settings.layer` shows of the stages that maps and lattices are `fitted` to, and of `others`, pausing with
+    the share done. What was done when `stop()` turned true is a picture too. Raises `UserError`."""
+    stages = [*fitted, *others]
+    pictures: list[Picture] = []
+    renderer = FrameRenderer(context, settings, fitted, window=window)
+    try:
+        for stage in stages:
+            for share in renderer.steps(stage, stop):
+                yield 0.98 * (len(pictures) + share) / len(stages)
+            pictures.append(renderer.picture)
+        light = renderer.light
+        where = placement(light) if settings.layer.startswith("map:") else {}
+        return Drawn(pictures, where, renderer.window, light.stats.photons, light_notices(light))
+    finally:
+        renderer.release()
+
+
 def bake_map(
     context: Context,
     stage: Stage,
     settings: RenderSettings,
     receiver: str,
     stop: Stop = lambda: False,
-) -> Generator[float, None, BakedMap]:
-    """Bake in steps, pausing with the share done. What was done when `stop()` turned true is a map too.
-
-    `settings.width`, `height`: texels. Raises `UserError`.
-    """
+) -> Generator[float, None, Drawn]:
+    """The caustic map of `receiver` in steps; `settings.width`, `height`: texels. Raises `UserError`."""
     check_receiver(stage.scene, receiver)
-    renderer = FrameRenderer(context, replace(settings, layer=f"map:{receiver}"), [stage])
-    try:
-        for share in renderer.steps(stage, stop):
-            yield 0.98 * share
-        light = renderer.light
-        return BakedMap(renderer.picture, placement(light), light.stats.photons, light_notices(light))
-    finally:
-        renderer.release()
+    return (yield from drawn(context, replace(settings, layer=f"map:{receiver}"), [stage], stop=stop))
 
 
 def bake(
@@ -99,9 +127,9 @@ def bake(
     yield 1.0
 
 
-def write_map(baked: BakedMap, scene: Scene, receiver: str, path: Path) -> None:
+def write_map(baked: Drawn, scene: Scene, receiver: str, path: Path) -> None:
     """Write a map and its placement, or neither. Raises `UserError`."""
-    rgb = baked.picture.rgb
+    rgb = baked.pictures[0].rgb
     check_finite(path.name, rgb)
     numbers = {**baked.placement, "receiver": receiver, "scene": scene.name, "file": path.name, "units": UNITS}
     if path.suffix.lower() == ".png":

@@ -14,14 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import UserError
-from ..base.generators import mapped
+from ..base.generators import mapped, part_of
 from ..edit.glass import bent
 from ..edit.parameters import Stage, apply, parameter, parts, value_of
 from ..gpu.context import Context
 from ..model.scene import SceneObject
 from ..model.settings import RenderSettings
-from .bake import placement
-from .frames import FrameRenderer, Picture
+from .bake import drawn
+from .frames import Picture
 from .sampling import CameraSampling
 
 INDEX = "index"
@@ -86,35 +86,27 @@ def gradient(
         spp, seed = max(1, CameraSampling.of(settings).budget // 4), (settings.seed + _OTHER_SEED) & 0xFFFFFFFF
         runs.append(replace(runs[0], photons=max(1, photons // 4), spp=spp, seed=seed))
     worse = _WORSE if settings.layer.startswith("map:") else _WORSE_SEEN
-    found: list[Derivative] = []
+    derivatives: list[Derivative] = []
     base: Picture | None = None
-    where = None
+    where: Mapping[str, object] = {}
+    share = 1.0 / (len(paths) * len(runs))
     for number, path in enumerate(paths):
-        h = (steps or {}).get(path) or (yield from mapped(_step(context, stage, few, path, window), lambda share: 0.0))
+        h = (steps or {}).get(path) or (yield from mapped(_step(context, stage, few, path, window), lambda done: 0.0))
         either = sides(stage, path, h)
         differences: list[Picture] = []
         for run in runs:
-            renderer = FrameRenderer(context, run, either, window=window)
-            wanted = [*either, stage] if base is None else either
-            drawn: list[Picture] = []
-            try:
-                for one in wanted:
-                    for share in renderer.steps(one):
-                        done = (len(drawn) + share) / len(wanted)
-                        yield (number + (len(differences) + done) / len(runs)) / len(paths)
-                    drawn.append(renderer.picture)
-                if where is None and settings.layer.startswith("map:"):
-                    where = placement(renderer.light)
-                window = window if renderer.window is None else renderer.window
-            finally:
-                renderer.release()
-            base = base or drawn[2]
-            differences.append(_difference(drawn[0], drawn[1], h))
-        its, norm = differences[0], max(float(np.linalg.norm(differences[0].rgb)), 1e-300)
+            steps_of = drawn(context, run, either, window, *([stage] if base is None else []))
+            found = yield from part_of(steps_of, (number * len(runs) + len(differences)) * share, share)
+            (low, high), base = found.pictures[:2], base or found.pictures[2]
+            where, window = where or found.placement, found.window
+            differences.append(_difference(low, high, h))
+        its, norm = differences[0], float(np.linalg.norm(differences[0].rgb))
+        if noise and not norm > 0.0:
+            raise UserError(f"'{path}' changes nothing there: its derivative is 0 everywhere")
         apart = float(np.linalg.norm(its.rgb - differences[1].rgb)) if noise else np.nan
-        found.append(Derivative(path, its, h, apart / worse / norm))
+        derivatives.append(Derivative(path, its, h, apart / worse / max(norm, 1e-300)))
     assert base is not None, "there are paths"
-    return Gradient(base, tuple(found), where)
+    return Gradient(base, tuple(derivatives), where or None)
 
 
 def _with_bands(settings: RenderSettings) -> RenderSettings:
@@ -136,16 +128,9 @@ def _step(
     """A change of a parameter that changes the picture as much as it should."""
     first = h = first_step(stage, path)
     for _ in range(_TRIES):
-        either = sides(stage, path, h)
-        renderer = FrameRenderer(context, settings, either, window=window)
-        try:
-            drawn = []
-            for one in either:
-                yield from renderer.steps(one)
-                drawn.append(renderer.picture.rgb)
-        finally:
-            renderer.release()
-        norm, moved = float(np.linalg.norm(drawn[0] + drawn[1])), float(np.linalg.norm(drawn[1] - drawn[0]))
+        found = yield from drawn(context, settings, sides(stage, path, h), window)
+        low, high = (picture.rgb for picture in found.pictures)
+        norm, moved = float(np.linalg.norm(low + high)), float(np.linalg.norm(high - low))
         if not moved > 0.0 or _LEAST_CHANGE <= moved / norm <= _MOST_CHANGE:
             break
         h = float(np.clip(h * _CHANGE * norm / moved, first / 64.0, _LARGEST * first))

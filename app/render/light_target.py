@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,8 +18,7 @@ from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..model.vectors import Vec3
 from ..passes.plane_frame import plane_frame
-from .bake import placement
-from .frames import FrameRenderer
+from .bake import drawn
 
 BINS = 16
 """Of maps that are compared in colour only."""
@@ -53,7 +51,7 @@ class Target:
     """Wanted instead of `values`, which are a line: see `solving.width_of`; as a share of the line."""
 
     def __post_init__(self) -> None:
-        if not np.isfinite(self.values).all() or not np.abs(self.values).max(initial=0.0) > 0.0:
+        if not np.isfinite(self.values).all() or not self.values.max(initial=0.0) > 0.0:
             raise UserError("the target is dark, empty or not finite: give light that is to be matched")
 
     @property
@@ -149,17 +147,13 @@ def as_it_is(
     settings, window = target.settings(settings), None if corners is None else target.window
     if corners is None:
         settings = replace(settings, width=_TEXELS, height=_TEXELS)
-    renderer = FrameRenderer(context, settings, [stage], window=window)
-    try:
-        yield from renderer.steps(stage)
-        where, spectral = placement(renderer.light), renderer.picture.spectral
-    finally:
-        renderer.release()
+    found = yield from drawn(context, settings, [stage], window)
+    where, spectral = found.placement, found.pictures[0].spectral
     assert spectral is not None
     if corners is None:
-        found = where["corners_world"]
-        assert isinstance(found, dict)
-        target = replace(target, corners=np.array([found[k] for k in ("top_left", "top_right", "bottom_left")]))
+        at = where["corners_world"]
+        assert isinstance(at, dict)
+        target = replace(target, corners=np.array([at[k] for k in ("top_left", "top_right", "bottom_left")]))
     return replace(target, values=target.seen(spectral, where))
 
 
@@ -180,8 +174,9 @@ def wanted(
     corners = None
     if between is not None:
         points = np.asarray(between, float)
-        if points.shape not in ((2, 3), (3, 3)) or not np.isfinite(points).all() or np.ptp(points, axis=0).max() == 0.0:
-            raise UserError("the target's place is given by two ends of a line or three corners, three numbers each")
+        is_place = points.shape in ((2, 3), (3, 3)) and np.isfinite(points).all()
+        if not is_place or np.linalg.matrix_rank(points[1:] - points[0]) < len(points) - 1:
+            raise UserError("the target's place is two ends of a line or three corners not in one, three numbers each")
         corners = points if len(points) == 3 else line(scene, receiver, *points)
     if width is not None:
         if values is not None or between is None or len(between) != 2 or corners is None:
@@ -214,9 +209,12 @@ def read_target(path: Path) -> np.ndarray:
     if path.suffix.lower() != ".csv":
         return read_image(path).rgb.astype(float)
     try:
-        found: np.ndarray = np.atleast_2d(np.loadtxt(io.StringIO(read_text(path, TABLE_BYTES)), delimiter=","))
+        lines = filter(str.strip, read_text(path, TABLE_BYTES).splitlines())
+        found = [[float(cell) for cell in line.split(",")] for line in lines]
+        if len({len(line) for line in found}) != 1:
+            raise ValueError("it is no table of numbers")
+        return np.array(found)
     except OSError as error:
         raise UserError(f"cannot read {path}: {reason_of(error)}") from error
     except ValueError as error:
         raise UserError(f"{path}: {error}; give lines of as many numbers each, with commas between") from error
-    return found

@@ -15,26 +15,29 @@ import numpy as np
 from ..base.errors import UserError
 from ..base.generators import part_of
 from ..base.tone_map import luminance
-from ..edit.glass import set_dispersion
+from ..edit.glass import set_dispersion, set_dispersion_gain
 from ..edit.parameters import Stage, value_of
 from ..edit.solved import Fit, Match, Ranked
 from ..gpu.context import Context
 from ..gpu.shader import forget_programs, keep_programs
 from ..model.optics import catalogue, glass
 from ..model.optics.glass import Dispersion
+from ..model.optics.spectrum import illuminant
+from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.picture_channels import Channels
-from .bake import placement
-from .frames import FrameRenderer, Picture
+from .bake import drawn
+from .frames import Picture
 from .gradient import INDEX, Gradient, gradient, nudged
 from .light_target import Target, wanted
 
 T = TypeVar("T")
-_SCANNED, _LEVELS, _TRIED = 20, 5, 1 << 15
-"""Glasses that are tried at first after the scene's own, and next to the nearest; how often more; photons of each."""
-_NEAR, _LIT, _HARDLY = 0.3, 0.6, 0.95
-"""What their blurred light may differ by, of the scene's own glass, of one of some and of one of many, to begin with
-it."""
+_PARTS, _INDICES, _TRIED = 3, 32, 1 << 15
+"""Pictures that show the light of all indices, how many indices each, and photons of them."""
+_NEAR, _HARDLY = 0.3, 0.95
+"""What the blurred light of the scene's own glass, and of another one, may differ by to begin with it."""
+_TESTED = 20
+"""Glasses that are rendered at the end, next to the nearest."""
 _ALIKE = 0.01
 """The same of a width, which glasses of any n_d may have."""
 _BLURS = (0.12, 0.04, 0.0)
@@ -71,12 +74,17 @@ class Solver:
         at, taken = np.zeros(len(paths)), 0
         if self.target.width is not None and len(paths) > 1:
             raise UserError("a width fixes one number only: give one parameter")
+        if len(set(paths)) < len(paths):
+            raise UserError("a parameter is given twice: give each once")
         for number, blur in enumerate(self._blurs):
             for step in range(_STEPS):
                 begun = (number + step / _STEPS) / len(self._blurs)
                 columns = yield from part_of(self._columns(at, paths, blur), begun, 1.0 / (len(self._blurs) * _STEPS))
                 move, covariance, error = self._solved(columns, blur)
                 taken += 1
+                for path, column in zip(paths, columns.T[1:], strict=True):
+                    if not column.any():
+                        raise UserError(f"'{path}' changes no light there: give another parameter, or another place")
                 light = max(float(np.linalg.norm(columns[:, 0])), 1e-300)
                 size = float(np.linalg.norm(columns[:, 1:] @ move)) / light
                 # Those that do nearly the same must not run away against each other.
@@ -85,6 +93,8 @@ class Solver:
                 if size < 1e-3 or (blur and size < 0.05):
                     break
         self._check_ends(columns)
+        if not error < _HARDLY:
+            raise UserError("no values were found that cast such light there: begin with values that are nearer")
         start = {path: 0.0 if path.endswith(f".{INDEX}") else value_of(self.stage, path) for path in paths}
         values = {path: start[path] + float(change) for path, change in zip(paths, at, strict=True)}
         deviations = dict(zip(paths, np.sqrt(np.diag(covariance)).tolist(), strict=True))
@@ -106,7 +116,7 @@ class Solver:
         says nothing."""
         entries = [e for e in catalogue.entries() if e.dispersion.is_dispersive and self._may_be(index, e.dispersion)]
         curves = np.stack([_at_bins(entry.dispersion, self._edges) for entry in entries])
-        start = yield from self._scanned(index, entries, curves)
+        start = yield from self._nearest(index, entries, curves)
         known: dict[int, Gradient] = {}
         names = [entry.qualified_name for entry in entries]
         best, errors, columns = start, np.zeros(0), np.zeros((0, 0))
@@ -125,7 +135,7 @@ class Solver:
                 columns = self._by_bin((yield from derived(best)), blur)
                 if not errors.size:
                     self._check(columns, entries[best].dispersion)
-                errors = self._errors(columns, curves - curves[best], blur)
+                errors = self._errors(columns, self._wanted(blur), curves - curves[best])
                 last, best = best, int(np.argmin(errors))
             best = last if len(seen) == _STEPS else best
         tried = _neighbours(known[best], curves - curves[best])
@@ -152,56 +162,66 @@ class Solver:
             return False
         return True
 
-    def _scanned(
+    def _nearest(
         self, index: int, entries: Sequence[catalogue.Entry], curves: np.ndarray
     ) -> Generator[float, None, int]:
-        """The glass whose blurred light is nearest: the scene's own; or one of some spread over n_d, of more as long as
-        none lights the target, and from there on over those next to it. Raises `UserError` where none does."""
-        errors: dict[int, float] = {}
-        near = _NEAR if self.target.width is None else _ALIKE
-
-        def nearest(chosen: Sequence[int] | np.ndarray) -> Generator[float, None, int]:
-            fresh = [int(i) for i in chosen if int(i) not in errors]
-            steps = self._lit(index, [entries[i] for i in fresh], _BLURS[0])
-            found = yield from part_of(steps, 0.4 * len(errors) / 700, 0.02)
-            errors.update(zip(fresh, found, strict=True))
-            return min(errors, key=errors.__getitem__)
-
+        """The glass to begin with: the scene's own where its light is near, or else the one whose light is foreseen to
+        be nearest. Raises `UserError` where none lights the target."""
         own = _at_bins(self.stage.scene.objects[index].material.dispersion, self._edges)
-        best = yield from nearest([int(np.abs(curves - own).max(axis=1).argmin())])
-        if errors[best] < near:
-            return best
-        by_index = np.argsort([entry.dispersion.n_d for entry in entries])
-        for level in range(_LEVELS):
-            ranks = np.linspace(0.01, 0.99, _SCANNED << level) * (len(entries) - 1)
-            best = yield from nearest(by_index[ranks.astype(int)])
-            if errors[best] < _LIT:
-                break
-        last = -1
-        while last != best and _NEAR <= errors[best] < _HARDLY:
-            last = best
-            best = yield from nearest(np.argsort(np.abs(curves - curves[best]).max(axis=1))[:_SCANNED])
-        if errors[best] < _HARDLY:
-            return best
+        nearest = int(np.abs(curves - own).max(axis=1).argmin())
+        (error,) = yield from part_of(self._lit(index, [entries[nearest]], _BLURS[0]), 0.0, 0.05)
+        if error < (_NEAR if self.target.width is None else _ALIKE):
+            return nearest
+        errors = yield from part_of(self._foreseen(index, curves), 0.05, 0.35)
+        if np.nanmin(errors) < _HARDLY:
+            return int(np.nanargmin(errors))
         raise UserError("no glass of the catalogue casts such light there: is the target's place right, and its scene?")
+
+    def _foreseen(self, index: int, curves: np.ndarray) -> Generator[float, None, np.ndarray]:
+        """What the blurred light of glasses of such `curves` (m, bins) differs by from the target, by few photons.
+
+        Under lamps of equal energy, through a glass whose index runs through all of theirs while nothing else has
+        colours, every bin of a spectrum is the light of one index."""
+        from scipy.interpolate import interp1d
+
+        scene, cells = _without_colours(self.stage.scene, index), []
+        edges = np.quantile(curves, np.linspace(0.0, 1.0, _PARTS * _INDICES + 1)) + 1e-9 * np.arange(
+            _PARTS * _INDICES + 1
+        )
+        settings = replace(self._few, bins=_INDICES)
+        for part in range(_PARTS):
+            rising = edges[part * _INDICES :][: _INDICES + 1]
+            swept = glass.table(np.linspace(380.0, 780.0, _INDICES + 1), rising[::-1].tolist(), "swept")
+            stage = replace(self.stage, scene=set_dispersion(scene, index, swept))
+            steps = drawn(self.context, settings, [stage], self.target.window)
+            found = yield from part_of(steps, part / _PARTS, 1.0 / _PARTS)
+            assert found.pictures[0].spectral is not None
+            cells.append(self.target.seen(found.pictures[0].spectral, found.placement)[..., ::-1])
+        blur = _BLURS[0] if self.target.width is None else 0.0
+        thin = slice(None, None, max(1, int(0.5 * blur * max(self.target.values.shape))))
+        light = _blurred(np.concatenate(cells, axis=-1), blur)[thin, thin]
+        of_index = interp1d(
+            0.5 * (edges[1:] + edges[:-1]), light, bounds_error=False, fill_value=(light[..., 0], light[..., -1])
+        )
+        lamps = sum(lamp.spectral_power.binned(self._edges) for lamp in self.stage.scene.lights)
+        wanted = _blurred(self.target.values.astype(float), blur)[thin, thin].ravel()
+        errors = []
+        for curve in curves:
+            shown = self._in_channels(of_index(curve) * lamps).reshape(-1, 1)
+            errors.append(self._errors(shown, wanted, np.zeros((1, 0)))[0])
+        return np.array(errors)
 
     def _lit(self, index: int, entries: Sequence[catalogue.Entry], blur: float) -> Generator[float, None, list[float]]:
         """What the light of each glass, blurred of few photons, differs by from the target."""
-        settings, errors = self._settings, []
-        if blur:
-            settings = replace(settings, photons=min(settings.photons or _TRIED, _TRIED))
+        settings, errors = self._few if blur else self._settings, []
         blur = blur if self.target.width is None else 0.0
         for number, entry in enumerate(entries):
             stage = replace(self.stage, scene=set_dispersion(self.stage.scene, index, entry.dispersion))
             # A renderer each: the spectral axis of several is coarse where some do not disperse.
-            renderer = FrameRenderer(self.context, settings, [stage], window=self.target.window)
-            try:
-                for share in renderer.steps(stage):
-                    yield (number + share) / len(entries)
-                shown = self._colours(renderer.picture, placement(renderer.light), blur).ravel()
-            finally:
-                renderer.release()
-            errors.append(float(self._errors(shown[:, None], np.zeros((1, 0)), blur)[0]))
+            steps = drawn(self.context, settings, [stage], self.target.window)
+            found = yield from part_of(steps, number / len(entries), 1.0 / len(entries))
+            shown = self._colours(found.pictures[0], found.placement, blur).ravel()
+            errors.append(float(self._errors(shown[:, None], self._wanted(blur), np.zeros((1, 0)))[0]))
         return errors
 
     def _by_bin(self, found: Gradient, blur: float) -> np.ndarray:
@@ -249,6 +269,11 @@ class Solver:
         return self.target.settings(self.settings)
 
     @property
+    def _few(self) -> RenderSettings:
+        """With few photons."""
+        return replace(self._settings, photons=min(self.settings.photons or _TRIED, _TRIED))
+
+    @property
     def _edges(self) -> np.ndarray:
         return np.linspace(380.0, 780.0, self.target.bins + 1)
 
@@ -260,10 +285,12 @@ class Solver:
     def _colours(self, picture: Picture, placement: object, blur: float) -> np.ndarray:
         """A picture in the target's cells and channels."""
         assert picture.spectral is not None
-        cells = self.target.seen(picture.spectral, placement)
-        if self.target.bin_edges_nm is None:
-            cells = Channels(tuple(self._edges.tolist())).to_rgb709(cells).astype(float)
-        return _blurred(cells, blur)
+        return _blurred(self._in_channels(self.target.seen(picture.spectral, placement)), blur)
+
+    def _in_channels(self, cells: np.ndarray) -> np.ndarray:
+        if self.target.bin_edges_nm is not None:
+            return cells
+        return Channels(tuple(self._edges.tolist())).to_rgb709(cells).astype(float)
 
     # ---- what is compared --------------------------------------------------------------------
 
@@ -271,10 +298,10 @@ class Solver:
     def _blurs(self) -> tuple[float, ...]:
         return _BLURS if self.target.width is None else (0.0,)
 
-    def _errors(self, columns: np.ndarray, moves: np.ndarray, blur: float) -> np.ndarray:
+    def _errors(self, columns: np.ndarray, wanted: np.ndarray, moves: np.ndarray) -> np.ndarray:
         """Of `moves` (m, k): see `_errors`; of a width what it differs by, relative."""
         if self.target.width is None:
-            return _errors(columns, self._wanted(blur), moves)
+            return _errors(columns, wanted, moves)
         found = self._widths(columns, moves)
         size = np.linalg.norm(columns[:, 1:] @ moves.T, axis=0)
         believed = np.isfinite(found) & (size <= _TRUST * np.linalg.norm(columns[:, 0]))
@@ -330,6 +357,18 @@ def solution(
         forget_programs(context.ctx)
 
 
+def _without_colours(scene: Scene, index: int) -> Scene:
+    """`scene` where no glass but object `index` disperses, under lamps of equal energy."""
+    even = illuminant("E")
+    lights = (
+        replace(lamp, spectral_power=even.scaled_to_power(lamp.spectral_power.power_w())) for lamp in scene.lights
+    )
+    for i, item in enumerate(scene.objects):
+        if i != index and item.material.transmits and not item.material.is_crystal:
+            scene = set_dispersion_gain(scene, i, 0.0)
+    return replace(scene, lights=tuple(lights))
+
+
 def _neighbours(found: Gradient, moves: np.ndarray) -> np.ndarray:
     """Numbers of the `moves` (m, bins) of the index that change the light least. In no bin it changes by more than all
     of it: glasses may be far apart in the violet alone, beyond some makers' data."""
@@ -337,7 +376,7 @@ def _neighbours(found: Gradient, moves: np.ndarray) -> np.ndarray:
     assert derivative is not None and base is not None
     moved = np.abs(moves) * np.linalg.norm(derivative, axis=(0, 1))
     changes = np.minimum(moved, np.linalg.norm(base, axis=(0, 1)))
-    return np.argsort((changes**2).sum(axis=1), kind="stable")[:_SCANNED]
+    return np.argsort((changes**2).sum(axis=1), kind="stable")[:_TESTED]
 
 
 def width_of(light: np.ndarray) -> np.ndarray:

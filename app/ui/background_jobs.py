@@ -15,7 +15,6 @@ from .compare import Comparison, engine_beside
 from .cursor_info import Cursor
 from .export import Exports, Shown
 from .gallery import Gallery, best_first
-from .gem_thread import GemThread
 from .ray_overlay import RayOverlay
 
 if TYPE_CHECKING:
@@ -56,7 +55,6 @@ class BackgroundJobs:
         self._rehearsals = Rehearsals(lambda: self._thread("rehearsal"))
         self.overlay = RayOverlay(context)
         self.cursor = Cursor()
-        self.gem = GemThread()
         self.gallery = Gallery(context, best_first(shipped_scenes()))
         self.engine_rests = False
         """In the last frame it left all time to an export."""
@@ -66,7 +64,7 @@ class BackgroundJobs:
     @property
     def is_busy(self) -> bool:
         """The window must not sleep."""
-        return self.exports.is_busy or self.comparison.is_busy or self.gem.is_busy
+        return self.exports.is_busy or self.comparison.is_busy
 
     def _thread(self, name: str) -> ContextThread | None:
         """The thread of that name, opened when it is first wanted."""
@@ -137,7 +135,6 @@ class BackgroundJobs:
     def release(self) -> list[str]:
         """End and free everything, before the engine is released; sentences about what could not be written."""
         self._rehearsals.release()
-        self.gem.release()
         self.cursor.release()
         problems = self.exports.release()
         self.comparison.release()

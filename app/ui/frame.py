@@ -14,7 +14,6 @@ from functools import partial
 
 from ..base.errors import UserError
 from ..base.memory import resident_bytes
-from ..base.not_yet import NOT_YET
 from ..edit import brush as brushes
 from ..edit import requests
 from ..edit.projection import View
@@ -63,10 +62,7 @@ def view_model_of(session: Session) -> ViewModel:
         compare_stale=comparison.is_stale,
         rays=session.jobs.overlay.rays,
         readings=session.jobs.overlay.readings,
-        gem=session.jobs.gem.reading(session.state) if session.state.preferences.panels.gem else NOT_YET,
-        derivative=session.jobs.exports.found.entry("derivative"),
-        answer=session.jobs.exports.found.entry("answer"),
-        plate=session.jobs.exports.found.entry("plate"),
+        found=session.jobs.exports.found.entries(),
         job=session.jobs.exports.job,
         engine_rests=session.jobs.engine_rests and session.jobs.exports.job is not None,
         writing=session.jobs.exports.writing,

@@ -48,10 +48,12 @@ class FoundPictures:
         """In place of what was found before."""
         self._found[name] = found
 
-    def entry(self, name: str) -> Found | None:
-        """With its texture; None while nothing was found."""
-        found = self._found.get(name)
-        if found is None or found.codes is None:
+    def entries(self) -> dict[str, Found]:
+        """All, with their textures."""
+        return {name: self._shown(name, found) for name, found in self._found.items()}
+
+    def _shown(self, name: str, found: Found) -> Found:
+        if found.codes is None:
             return found
         kept = self._textures.get(name)
         if kept is None or kept[0] is not found:
@@ -82,6 +84,8 @@ def solving_job(
             words, work = _derive(context, request, state, found)
         case requests.CheckPlate():
             words, work = _check(request, state, found, notices)
+        case requests.JudgeStone():
+            words, work = _judge(request, state, found)
     return ExportJob(words, work, notices, thread)
 
 
@@ -162,11 +166,31 @@ def _check(
         report = yield from _on_thread(
             lambda progress, stopped: check_plate(mesh, glass, rgb, request.distance, progress, stopped)
         )
-        codes = np.round(255.0 * srgb_oetf(np.clip(report.pictures(), 0.0, 1.0))).astype(np.uint8)
-        found.keep("plate", Found(of, report.rows(), codes))
+        found.keep("plate", Found(of, report.rows(), _codes(report.pictures())))
 
     name = f"{item.name} against {request.target.name}"
     return Words(f"Plate {name}", f"Checked {name}: see the Lens panel.", "The plate was not checked."), work()
+
+
+def _judge(request: requests.JudgeStone, state: State, found: FoundPictures) -> tuple[Words, Iterator[float]]:
+    from ..model.gems.in_scene import chosen_stone, stone_in
+    from ..model.gems.report import gem_report
+
+    item, stone = chosen_stone(state.scene, request.name), stone_in(state.scene, request.name)
+
+    def work() -> Iterator[float]:
+        report = yield from _on_thread(lambda progress, stopped: gem_report(stone, report=progress, cancelled=stopped))
+        if report is not None:
+            rows = tuple((name, f"{value}  {meaning}") for name, value, meaning in report.rows())
+            found.keep("gem", Found((item,), rows, _codes(np.hstack(list(report.pictures.values())))))
+
+    words = f"Figures of {item.name}", "Figures and pictures are in the Gem panel.", "The stone was not judged."
+    return Words(*words), work()
+
+
+def _codes(rgb: np.ndarray) -> np.ndarray:
+    """uint8, of linear Rec.709 as it is."""
+    return np.round(255.0 * srgb_oetf(np.clip(rgb, 0.0, 1.0))).astype(np.uint8)
 
 
 def _on_thread(work: Callable[[Callable[[float, str], None], Callable[[], bool]], T]) -> Generator[float, None, T]:

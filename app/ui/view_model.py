@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from ..base.not_yet import NOT_YET
 from ..edit.autosave import Recovery
 from ..edit.history import HistoryEntry
 from ..edit.picking import PickHit
@@ -15,7 +15,6 @@ from ..model.scene import Scene, Vec3
 from ..model.staging import UpAxis
 from ..passes.ray_line import RayLine
 from ..render.viewer.stats import LiveStats
-from .gem_thread import GemReading
 from .ray_readings import RayReading
 
 
@@ -155,12 +154,8 @@ class ViewModel:
     rays: tuple[RayLine, ...] = ()
     readings: tuple[RayReading, ...] = ()
     """What those rays say in numbers."""
-    gem: GemReading = NOT_YET
-    """Of the selected stone, while its panel is open."""
-    derivative: Found | None = None
-    answer: Found | None = None
-    """Glasses or numbers that light a receiver as was wanted."""
-    plate: Found | None = None
+    found: Mapping[str, Found] = field(default_factory=dict)
+    """What jobs found last, by the name of the job."""
     job: JobInfo | None = None
     engine_rests: bool = False
     """The job has all of the time: it is waited for."""

@@ -44,7 +44,7 @@ def rows(gear: int, fold: int, corner: Point, angles: list[float], part: str) ->
         distance = through(corner if number == 1 else point, angle)
         first = gear // (2 * fold) * (1 - number % 2)
         indices = tuple(float(first + gear // fold * k or gear) for k in range(fold))
-        tiers.append(Tier(angle, distance, indices, (f"{part}{number + 1}", *[""] * (fold - 1))))
+        tiers.append(Tier(angle, distance, indices, f"{part}{number + 1}"))
         if number:
             before, own = (math.radians(abs(a)) for a in angles[number - 1 : number + 1])
             sign = math.copysign(1.0, angle)
@@ -60,11 +60,10 @@ def rows(gear: int, fold: int, corner: Point, angles: list[float], part: str) ->
 def portuguese() -> FacetDesign:
     """Sixteen-fold rows, four below and three above."""
     below = rows(64, 16, (1.0, -HALF_GIRDLE), [-58.0, -51.0, -45.5, -41.0], "P")
-    girdle = Tier(90.0, math.cos(math.pi / 16), tuple(2.0 + 4.0 * k for k in range(16)), ("G", *[""] * 15))
+    girdle = Tier(90.0, math.cos(math.pi / 16), tuple(2.0 + 4.0 * k for k in range(16)), "G")
     above = rows(64, 16, (1.0, HALF_GIRDLE), [48.0, 38.0, 27.0], "C")
-    table = Tier(0.0, 0.30, (64.0,), ("T",))
-    header = ("Portuguese round for quartz",)
-    return FacetDesign(header[0], (*below, girdle, *above, table), 64, 0.0, 16, True, QUARTZ, header)
+    table = Tier(0.0, 0.30, (64.0,), "T")
+    return FacetDesign("Portuguese round for quartz", (*below, girdle, *above, table), 64, 0.0, QUARTZ, 16, True)
 
 
 def steps(outline: dict[float, tuple[float, ...]], angles: list[float], share: float, part: str) -> list[Tier]:
@@ -74,8 +73,7 @@ def steps(outline: dict[float, tuple[float, ...]], angles: list[float], share: f
     inset, z = 0.0, math.copysign(HALF_GIRDLE, angles[0])
     for number, angle in enumerate(angles, start=1):
         for letter, (distance, indices) in zip("abc", outline.items(), strict=False):
-            named = (f"{part}{number}{letter}", *[""] * (len(indices) - 1))
-            tiers.append(Tier(angle, through((distance - inset, z), angle), indices, named))
+            tiers.append(Tier(angle, through((distance - inset, z), angle), indices, f"{part}{number}{letter}"))
         inset += share / math.tan(math.radians(abs(angle)))
         z += math.copysign(share, angle)
     return tiers
@@ -92,11 +90,11 @@ def stepped(
 ) -> FacetDesign:
     """A design of `steps`: angles and height of the rows `below` and `above`, and the height of the table."""
     girdle = [
-        Tier(90.0, distance, indices, (f"G{letter}", *[""] * (len(indices) - 1)))
+        Tier(90.0, distance, indices, f"G{letter}")
         for letter, (distance, indices) in zip("abc", outline.items(), strict=False)
     ]
-    tiers = (*steps(outline, *below, "P"), *girdle, *steps(outline, *above, "C"), Tier(0.0, table, (96.0,), ("T",)))
-    return FacetDesign(title, tiers, 96, 0.0, fold, True, n_d, (title,))
+    tiers = (*steps(outline, *below, "P"), *girdle, *steps(outline, *above, "C"), Tier(0.0, table, (96.0,), "T"))
+    return FacetDesign(title, tiers, 96, 0.0, n_d, fold, True)
 
 
 if __name__ == "__main__":

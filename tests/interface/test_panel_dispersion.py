@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit.lights import set_light_spectrum
-from spectrasplat.edit.requests import MatchGlass
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.optics import catalogue, glass
@@ -54,11 +53,6 @@ def test_double_click_brings_the_natural_gain_back(panel: PanelRig) -> None:
     panel.drag_slider("Dispersion gain", 0.13, 0.7)
     panel.click("Dispersion gain", count=2)
     assert panel.glass == catalogue.find(N_SF11)
-
-
-def test_a_glass_is_looked_for(panel: PanelRig) -> None:
-    panel.click("Find glass")
-    assert panel.state.requests == (MatchGlass(0),)
 
 
 def test_typing_goes_with_ctrl_click(panel: PanelRig) -> None:

@@ -73,13 +73,13 @@ def test_a_plate_is_checked_in_the_window(gl: Context, tmp_path: Path) -> None:
         rig.click("Check plate")
         asked = rig.state.requests[-1]
         assert asked == CheckPlate(0, tmp_path / "target.npy", 300.0)
-        assert exports.found.entry("plate") is None
+        assert exports.found.entries().get("plate") is None
         exports.begin(asked, state, shown)
         assert "see the Lens panel" in finished(exports)
-        found = exports.found.entry("plate")
+        found = exports.found.entries().get("plate")
         assert found is not None and found.codes.shape[1] > 2 * found.codes.shape[0] > 0
         assert "correlation 0.9" in dict(found.rows)["error"]
-        rig.view_model = replace(rig.view_model, plate=found)
+        rig.view_model = replace(rig.view_model, found={"plate": found})
         rig.frame(2)
         assert "Efficiency" in rig.items.items
         item = state.scene.objects[0]
@@ -98,9 +98,9 @@ def test_a_derivative_is_found_in_the_window(gl: Context) -> None:
     exports, state = Exports(gl), replace(scene_state("spectrum"), viewport_size=(48, 27))
     shown = Shown(None, None, 0.0, 0)  # type: ignore[arg-type]
     exports.begin(Derive("objects.prism.n_d", 2048), state, shown)
-    assert exports.found.entry("derivative") is None
+    assert exports.found.entries().get("derivative") is None
     assert "Solve panel" in finished(exports)
-    found = exports.found.entry("derivative")
+    found = exports.found.entries().get("derivative")
     assert found is not None and found.texture and found.is_of(state.scene, state.camera, "objects.prism.n_d")
     red, blue = (found.codes[..., i].astype(int) - found.codes[..., 1] for i in (0, 2))
     assert red.max() > 100 and blue.max() > 100
@@ -124,13 +124,13 @@ def test_a_number_is_fitted_in_the_window(gl: Context, tmp_path: Path) -> None:
     shown = Shown(None, None, 0.0, 0)  # type: ignore[arg-type]
     exports.begin(ask, state, shown)
     assert "objects.prism.V_d: " in finished(exports)
-    answer = exports.found.entry("answer")
+    answer = exports.found.entries().get("answer")
     assert answer is not None and answer.is_of(state.scene) and not answer.is_of(scene_state("spectrum").scene)
     rows = dict(answer.rows)
     assert float(rows["objects.prism.V_d"].split()[0]) == pytest.approx(20.0, abs=0.5)
     assert rows["By"] == "wanted.npy, on 'screen'" and rows["what is left"].startswith("differs by")
     with PanelRig(gl, draw_solve, replace(state, selection=Selection("object", 0))) as rig:
-        rig.view_model = replace(rig.view_model, answer=answer)
+        rig.view_model = replace(rig.view_model, found={"answer": answer})
         rig.frame(2)
         assert {"Asked", "objects.prism.V_d", "What is left"} <= set(rig.items.items)
     with pytest.raises(UserError, match="changes no light"):

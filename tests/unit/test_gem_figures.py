@@ -49,7 +49,7 @@ def test_a_roof_returns_all_that_enters_above_the_critical_angle() -> None:
     found = figures(turned_prism(n), head_deg=0.0, count=32)
     r = ((n - 1.0) / (n + 1.0)) ** 2
     assert found.iso == pytest.approx(1.0 - r, abs=2e-4) and found.cos == pytest.approx(found.iso, abs=1e-12)
-    assert found.leak == 0.0 and found.iso_glare == pytest.approx(1.0, abs=2e-4)
+    assert found.leak == 0.0 and found.iso + found.glare == pytest.approx(1.0, abs=2e-4)
     # 45° is within the critical angle for n < √2, on either side of which it leaks or does not.
     assert figures(turned_prism(1.4139), count=16).leak > 0.1
     assert figures(turned_prism(1.4146), count=16).leak == 0.0
@@ -135,7 +135,6 @@ def test_a_round_stone_s_curves_are_even() -> None:
     for curves in (found.tilt_iso, found.tilt_cos, found.tilt_head):
         assert curves.shape == (2, len(TILTS_DEG))
         assert np.abs(curves - curves[:, ::-1]).max() < 5e-3 and np.abs(curves[0] - curves[1]).max() < 5e-3
-    assert found.line_iso[0] < found.line_iso[2]  # blue light leaves through more reflection
     aset = found.pictures["aset"]
     assert aset.shape == (512, 512, 3) and np.abs(aset - aset[::-1]).mean() < 5e-3
     assert found.rows()[0][0] == "ISO" and json.dumps(found.values(), allow_nan=False)

@@ -159,7 +159,7 @@ def test_faces_that_meet_narrow_their_glass(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text, words",
     [
-        ("a, b\n1, 2\n", "does not name columns"),
+        ("a, b\n1, 2\n", "no surfaces follow a first row of column names"),
         (HEAD.replace("glass", "glas") + "1, 2, N-BK7, 1\n", "line 1: unknown column 'glas', did you mean 'glass'"),
         (HEAD.replace(", semi_diameter", "") + "1, 2, N-BK7\n", "line 1: give a column 'semi_diameter' or 'diameter'"),
         (HEAD + "9, 2, N-BK9, 1\n-9, 0, , 1\n", "line 2: glass: unknown glass 'N-BK9', did you mean"),

@@ -47,15 +47,8 @@ class Tier:
     """Of the planes from the origin."""
     indices: tuple[float, ...]
     """Positions on the gear, whole ones as a rule; of a table or culet one that means nothing."""
-    names: tuple[str, ...] = ()
-    """One for each index, "" where it has none; or none at all."""
-    instructions: str = ""
-    """How to cut it."""
-
-    @property
-    def name(self) -> str:
-        """The names of its facets, "" where none has one."""
-        return "/".join(dict.fromkeys(name for name in self.names if name))
+    name: str = ""
+    """Those of its facets; "" where they have none."""
 
     @property
     def is_below(self) -> bool:
@@ -73,41 +66,35 @@ class FacetDesign:
     """Teeth of the index gear; below zero: its indices run clockwise."""
     location: float = 0.0
     """The index at the front, -y."""
-    symmetry: int = 1
-    """As the file says; facets are listed one by one all the same."""
-    is_mirrored: bool = False
     n_d: float | None = None
     """The refractive index that it was made for."""
-    headers: tuple[str, ...] = ()
-    footers: tuple[str, ...] = ()
+    symmetry: int = 1
+    """Turns that leave it as it is, for programs of facetting; facets are listed one by one all the same."""
+    is_mirrored: bool = False
 
     @cached_property
-    def facets(self) -> tuple[tuple[Tier, float, str], ...]:
-        """Tier, index and name of every facet, in the order of `planes`."""
-        return tuple(
-            (tier, index, name)
-            for tier in self.tiers
-            for index, name in zip(tier.indices, tier.names or ("",) * len(tier.indices), strict=True)
-        )
+    def facets(self) -> tuple[tuple[Tier, float], ...]:
+        """Tier and index of every facet, in the order of `planes`."""
+        return tuple((tier, index) for tier in self.tiers for index in tier.indices)
 
     @cached_property
     def planes(self) -> np.ndarray:
         """Half-spaces n·x <= d, float64 (P, 4) as rows (n, d), one a facet."""
-        signs = np.array([-1.0 if tier.is_below else 1.0 for tier, _, _ in self.facets])
-        angles = np.radians([abs(tier.angle_deg) for tier, _, _ in self.facets])
-        turns = np.array([(index - self.location) / self.gear for _, index, _ in self.facets]) - 0.25
+        signs = np.array([-1.0 if tier.is_below else 1.0 for tier, _ in self.facets])
+        angles = np.radians([abs(tier.angle_deg) for tier, _ in self.facets])
+        turns = np.array([(index - self.location) / self.gear for _, index in self.facets]) - 0.25
         across = np.where(angles == 0.0, 0.0, np.sin(angles))
         azimuths = 2.0 * np.pi * turns
         normals = [across * np.cos(azimuths), across * np.sin(azimuths), signs * np.cos(angles)]
-        return np.column_stack([*normals, [tier.distance for tier, _, _ in self.facets]])
+        return np.column_stack([*normals, [tier.distance for tier, _ in self.facets]])
 
     @cached_property
     def cut_away(self) -> tuple[str, ...]:
         """Facets of which others leave nothing, in words. Raises `UserError` as `mesh`."""
         _, faces = self._shaped(self.title, faces_of)
         return tuple(
-            f"{name or tier.name or f'{tier.angle_deg:g}°'} at index {index:g}"
-            for (tier, index, name), face in zip(self.facets, faces, strict=True)
+            f"{tier.name or f'{tier.angle_deg:g}°'} at index {index:g}"
+            for (tier, index), face in zip(self.facets, faces, strict=True)
             if not len(face)
         )
 
@@ -143,20 +130,17 @@ def read_asc(path: str | os.PathLike[str]) -> FacetDesign:
     for record in _records(path, text.replace("\0", "").replace("\x1a", "")):
         if record.key not in read:
             record.fail("a preform (p) is not read; turn it into facets in GemCad")
-        if record.key in "gyi" and read[record.key]:
+        if record.key in "gi" and read[record.key]:
             record.fail(f"'{record.key}' was given before; leave one of them")
         read[record.key].append(record)
     if not read["g"]:
         raise UserError(f"{path.name}: there is no gear (g); write 'g 96 0.0' in its second line")
     gear, location = read["g"][0].gear()
-    fold, is_mirrored = read["y"][0].symmetry() if read["y"] else (1, False)
     tiers = tuple(record.tier(abs(gear)) for record in read["a"])
     if not 4 <= (count := sum(len(tier.indices) for tier in tiers)) <= MOST_FACETS:
         raise UserError(f"{path.name}: it has {count} facets; a stone has 4 to {MOST_FACETS}")
-    headers, footers = (tuple(record.words for record in read[key]) for key in "hf")
-    title = next(filter(None, headers), path.stem)
-    n_d = read["i"][0].refractive_index() if read["i"] else None
-    return FacetDesign(title, tiers, gear, location, fold, is_mirrored, n_d, headers, footers)
+    title = next((record.words for record in read["h"] if record.words), path.stem)
+    return FacetDesign(title, tiers, gear, location, read["i"][0].refractive_index() if read["i"] else None)
 
 
 def _records(path: Path, text: str) -> list[_Record]:
@@ -216,14 +200,6 @@ class _Record(NamedTuple):
             self.fail(f"a gear has 3 to {_MOST_TEETH} teeth, not {teeth:g}; g 96 0.0 is the usual one")
         return int(teeth), location
 
-    def symmetry(self) -> tuple[int, bool]:
-        """How many-fold, and whether there is a mirror."""
-        flag = next((word for word in self.words.split()[1:] if word.casefold() in ("y", "n")), "")
-        (fold,) = self.numbers(self.words.strip().removesuffix(flag), 1, (1.0,))
-        if fold != int(fold) or not 1 <= fold <= _MOST_TEETH:
-            self.fail(f"a symmetry is a whole number from 1, not {fold:g}; y 8 y is that of a round brilliant")
-        return int(fold), flag.casefold() == "y"
-
     def refractive_index(self) -> float:
         """Of the stone."""
         (index,) = self.numbers(self.words, 1, (1.54,))
@@ -232,7 +208,7 @@ class _Record(NamedTuple):
         return index
 
     def tier(self, teeth: int) -> Tier:
-        """Angle and distance, then indices, names behind `n` and, behind `G`, instructions; a table's one facet needs
+        """Angle and distance, then indices, names behind `n` and, behind `G`, how to cut it; a table's one facet needs
         no index."""
         words = re.findall(r"\n|\S+", self.words)
         if len(words) < 2 or not all(map(_is_number, words[:2])):
@@ -245,15 +221,14 @@ class _Record(NamedTuple):
         if not 0.0 <= distance <= _FURTHEST:
             self.fail(f"a distance of {distance:g} is none of a facet; give one from 0 to {_FURTHEST:g}")
         indices: list[float] = []
-        names: dict[int, str] = {}
+        names: list[str] = []
         lines, instructions = 0, ""
         awaits_name = is_in_name = False
         for at, word in enumerate(words[2:], start=3):
-            place = max(len(indices) - 1, 0)
             if word == "\n":
                 lines += 1
             elif awaits_name:
-                names[place], awaits_name, is_in_name = word, False, True
+                names, awaits_name, is_in_name = [*names, word], False, True
             elif word in "nN":
                 awaits_name = True
             elif word in "gG":
@@ -265,7 +240,7 @@ class _Record(NamedTuple):
                 if not abs(indices[-1]) <= teeth:
                     self.fail(f"index {word} is beyond the gear's {teeth} teeth; separate indices by blanks", lines)
             elif is_in_name:
-                names[place] += f" {word}"
+                names[-1] += f" {word}"
             else:
                 self.fail(
                     f"'{word[:40]}' is no index; write a facet's name behind an n, instructions behind a G", lines
@@ -275,10 +250,7 @@ class _Record(NamedTuple):
                 self.fail("numbers follow a cutting instruction (G); put a tier's indices before it", more)
         if not indices and angle != 0.0:
             self.fail("a tier without indices has no facets; list them behind its distance")
-        indices = indices or [0.0]
-        named = tuple(names.get(i, "") for i in range(len(indices)))
-        kept = " ".join(re.sub(r"\n [gG](?= |$)", "", instructions).split())
-        return Tier(angle, distance, tuple(indices), named if any(named) else (), kept)
+        return Tier(angle, distance, tuple(indices or [0.0]), "/".join(dict.fromkeys(names)))
 
 
 def _is_number(word: str) -> bool:
@@ -297,23 +269,15 @@ def asc_text(design: FacetDesign) -> str:
     lines = ["GemCad 5.0", f"g {design.gear} {_decimal(design.location)}"]
     lines.append(f"y {design.symmetry} {'y' if design.is_mirrored else 'n'}")
     lines += [f"I {_decimal(design.n_d)}"] if design.n_d is not None else []
-    lines += [f"H {_one_line(text)}" for text in design.headers or (design.title,)]
+    lines += [f"H {line}" for line in design.title.splitlines()]
     for tier in design.tiers:
         distance = -tier.distance if tier.angle_deg == 0.0 and tier.is_below else tier.distance
-        words = ["a", _decimal(tier.angle_deg), _decimal(distance)]
-        for index, name in zip(tier.indices, tier.names or ("",) * len(tier.indices), strict=True):
-            words += [_decimal(index).removesuffix(".0")]
-            words += ["n", "_".join(name.split())] if name.strip() else []
-        words += ["G", _one_line(tier.instructions)] if tier.instructions else []
-        lines.append(" ".join(words))
-    lines += [f"F {_one_line(text)}" for text in design.footers]
+        first, *others = (_decimal(index).removesuffix(".0") for index in tier.indices)
+        name = ["n", "_".join(tier.name.split())] if tier.name.strip() else []
+        lines.append(" ".join(["a", _decimal(tier.angle_deg), _decimal(distance), first, *name, *others]))
     return "\r\n".join(lines) + "\r\n"
 
 
 def _decimal(value: float) -> str:
     """Without exponent, and as exact as a float64 is."""
     return np.format_float_positional(value, unique=True, trim="0")
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())

@@ -188,13 +188,12 @@ _ROWS = (
     ("ISO, head", "{iso_head:.1%}", "with the shadow of a head, {head_deg:g}°"),
     ("COS, head", "{cos_head:.1%}", "with the shadow of a head, {head_deg:g}°"),
     ("weighted return", "{weighted:.1%}", "into all directions, by the square of the cosine"),
-    ("glare", "{glare:.1%}", "reflected on the outside; with it ISO {iso_glare:.1%}, COS {cos_glare:.1%}"),
+    ("glare", "{glare:.1%}", "reflected on the outside"),
     ("leak", "{leak:.1%}", "light from behind the stone"),
     ("window", "{window:.1%}", "of the area shows mostly what is behind"),
     ("extinction", "{dark:.1%}", "of the area is dark under the head, without being a window"),
     ("fire", "{fire_deg:.2f}°", "mean angle between F and C of returned light"),
     ("coloured", "{coloured:.1%}", "of returned light is spread wider than the eye's pupil"),
-    ("dispersed return", "{dispersed:.1%}", "of the light, that part by the square of the cosine"),
     ("scintillation", "{scintillation:.1%}", "change of the picture by a tilt of 3°"),
     ("not followed", "{rest:.4%}", "of the light"),
 )
@@ -213,8 +212,6 @@ class GemFigures:
     cos_head: float
     weighted: float
     glare: float
-    iso_glare: float
-    cos_glare: float
     leak: float
     rest: float
     """Not followed to its end."""
@@ -223,7 +220,6 @@ class GemFigures:
     """Extinction."""
     fire_deg: float
     coloured: float
-    dispersed: float
     scintillation: float
 
     def rows(self) -> tuple[tuple[str, str, str], ...]:
@@ -283,15 +279,12 @@ def figures(
         cos_head=sums[g.COSINE] - sums[g.COSINE_HEAD],
         weighted=weighted,
         glare=sums[g.GLARE],
-        iso_glare=above + sums[g.GLARE_ISO],
-        cos_glare=sums[g.COSINE] + sums[g.GLARE_COS],
         leak=sums[g.LEAK],
         rest=sums[g.REST],
         window=float(windows.mean()),
         dark=float(dark.mean()),
         fire_deg=math.degrees(sums[g.SPREAD] / above) if above > 0.0 else 0.0,
         coloured=sums[g.SEEN] / above if above > 0.0 else 0.0,
-        dispersed=sums[g.SEEN_SQUARE],
         scintillation=change,
     )
 

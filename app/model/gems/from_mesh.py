@@ -111,7 +111,7 @@ def _design(planes: np.ndarray, size: float, start: FacetDesign) -> FacetDesign:
         signed = angle - 180.0 if angle > 90.0 else angle
         signed = -0.0 if angle == 180.0 else signed
         distance = float(planes[group, 3].mean())
-        parts[part].append(Tier(signed, distance, indices, (name, *[""] * (len(indices) - 1))))
+        parts[part].append(Tier(signed, distance, indices, name))
     tiers = (*parts["P"], *parts["G"], *parts["C"])
     fold, is_mirrored = _symmetry(gear, [{int(i) % gear for i in t.indices} for t in tiers if t.angle_deg != 0.0])
     return replace(start, tiers=tiers, gear=gear, location=location, symmetry=fold, is_mirrored=is_mirrored)

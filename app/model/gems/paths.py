@@ -20,13 +20,10 @@ GLARE, HEAD, HIGH, LOW, LEAK = 0, 1, 2, 3, 4
 the head, up to 45° from the viewer, down to the girdle's plane, from behind it, …"""
 REST = 5
 """… or were not followed. These six add up to 1."""
-GLARE_ISO, GLARE_COS, COSINE, COSINE_HEAD, SQUARE = 6, 7, 8, 9, 10
-"""Of glare what comes from before the girdle's plane, and that by the cosine to the viewer; of the rest that comes from
-there the sum by the cosine, that within the angle of the head, and the sum by the cosine's square."""
-SPREAD, SEEN, SEEN_SQUARE = 11, 12, 13
-"""Of the same the sum by the angle between F and C, what has more of it than the eye's pupil, and that by the square of
-the cosine."""
-COLUMNS = 14
+COSINE, COSINE_HEAD, SPREAD, SEEN = 6, 7, 8, 9
+"""Of what comes from before the girdle's plane through the stone: the sum by the cosine to the viewer, that within the
+angle of the head, the sum by the angle between F and C, and what has more of that than the eye's pupil."""
+COLUMNS = 10
 MOST_EVENTS = 1000
 """Facets that one ray's light meets, with all of its parts."""
 _STACK = 64
@@ -107,15 +104,11 @@ def _ended(weight, ray, up, head, dn, pupil, out):
     c = ray[3] * up[0] + ray[4] * up[1] + ray[5] * up[2]
     if ray[11] == 0.0:  # it was never inside
         out[GLARE] += weight
-        if c > 0.0:
-            out[GLARE_ISO] += weight
-            out[GLARE_COS] += weight * c
         return
     if c <= 0.0:
         out[LEAK] += weight
         return
     out[COSINE] += weight * c
-    out[SQUARE] += weight * c * c
     if c >= head:
         out[HEAD] += weight
         out[COSINE_HEAD] += weight * c
@@ -128,7 +121,6 @@ def _ended(weight, ray, up, head, dn, pupil, out):
     out[SPREAD] += weight * angle
     if angle > pupil:
         out[SEEN] += weight
-        out[SEEN_SQUARE] += weight * c * c
 
 
 @_part

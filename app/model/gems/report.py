@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 from .figures import (
     ASET_HEAD_DEG,
     UP,
@@ -70,9 +69,6 @@ class GemReport:
     tilt_cos: np.ndarray
     tilt_head: np.ndarray
     """As `tilt_iso`, with the shadow of the head."""
-    lines_nm: tuple[float, ...]
-    line_iso: tuple[float, ...]
-    """Light return, face up, at these wavelengths."""
     pictures: dict[str, np.ndarray]
     """By the names of `PICTURES`: float32 (512, 512, 3), linear Rec.709, y up; none where it was stopped before."""
     table: TableFire | None = None
@@ -80,14 +76,10 @@ class GemReport:
 
     def rows(self) -> tuple[tuple[str, str, str], ...]:
         """Name, value and meaning of its figures."""
-        more = [
-            (f"ISO, {nm:.0f} nm", f"{100.0 * value:.1f} %", "light return of an even hemisphere at this wavelength")
-            for nm, value in zip(self.lines_nm, self.line_iso, strict=True)
-        ]
-        if self.table is not None:
-            share = f"{100.0 * self.table.coloured:.1f} %"
-            more.append(("fire on the table", share, "of the light thrown on a table is coloured"))
-        return (*self.figures.rows(), *more)
+        if self.table is None:
+            return self.figures.rows()
+        share = f"{100.0 * self.table.coloured:.1f} %"
+        return (*self.figures.rows(), ("fire on the table", share, "of the light thrown on a table is coloured"))
 
     def values(self) -> dict[str, Any]:
         """All numbers, for a file."""
@@ -97,7 +89,6 @@ class GemReport:
             "notes": list(self.stone.notes),
             "coloured_on_table": None if self.table is None else self.table.coloured,
             "figures": {key: _number(value) for key, value in vars(self.figures).items()},
-            "iso_by_wavelength_nm": {f"{nm:g}": value for nm, value in zip(self.lines_nm, self.line_iso, strict=True)},
             "tilt_deg": self.tilts_deg.tolist(),
             "tilt": {
                 f"{name}_about_{axis}": [_number(value) for value in curve]
@@ -132,24 +123,18 @@ def gem_report(
     found = figures(stone, head_deg, 256, lambda share, text: told(0.2 * share, text), stopped)
     if found is None:
         return None
-    lines = (LINE_F_NM, LINE_D_NM, LINE_C_NM)
-    by_line = []
-    for i, nm in enumerate(lines):
-        told(0.2 + 0.03 * i, "wavelengths")
-        sums = seen_mean(look(stone, face_places(stone, 128), UP, UP, head_deg, nm))
-        by_line.append(float(returned(sums)))
     curves = np.full((3, 2, len(TILTS_DEG)), np.nan)
     ways = [(axis, k) for axis in (0, 1) for k in range(len(TILTS_DEG))]
     for i, (axis, k) in enumerate(ways):
         if stopped():
             break
-        told(0.3 + 0.2 * i / len(ways), "tilting it")
+        told(0.2 + 0.3 * i / len(ways), "tilting it")
         curves[:, axis, k] = _tilt(stone, axis, float(TILTS_DEG[k]), head_deg)
     pictures = _pictures(stone, lambda share, text: told(0.5 + 0.5 * share, "pictures"), stopped)
     thrown = None
     if table is not None and not stopped():
         thrown = table(lambda share, text: told(share, text, own, 1.0), stopped)
-    return GemReport(stone, found, TILTS_DEG, curves[0], curves[1], curves[2], lines, tuple(by_line), pictures, thrown)
+    return GemReport(stone, found, TILTS_DEG, curves[0], curves[1], curves[2], pictures, thrown)
 
 
 def _tilt(stone: Stone, axis: int, angle_deg: float, head_deg: float) -> tuple[float, float, float]:

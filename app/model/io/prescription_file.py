@@ -80,7 +80,8 @@ def _from_table(path: Path, rows: Sequence[Row]) -> Lens:
     rows = [row for row in rows if not row.cells[0].startswith("#")]
     if not rows or not any(heading in ("radius", "curvature") for heading in map(_column, rows[0].cells)):
         raise UserError(
-            f"{path}: it is no lens: its first row does not name columns; give radius, thickness, glass, semi_diameter"
+            f"{path}: it is no lens: no surfaces follow a first row of column names; give radius, thickness, glass, "
+            "semi_diameter"
         )
     head, *body = rows
     columns = [_column(cell) for cell in head.cells]
@@ -226,11 +227,15 @@ def _lens(path: Path, listed: Sequence[_Listed], makers: Sequence[str], notes: l
         if each.radius == 0.0 or math.isnan(each.radius):
             _fail(path, each.line, f"radius is {each.radius:g}; a plane has radius inf")
         if at < last and not (math.isfinite(each.thickness) and each.thickness >= 0.0):
-            _fail(path, each.line, f"thickness is {each.thickness:g}; give the distance to the next surface, 0 or more")
+            _fail(
+                path, each.line, f"thickness {_told(each.thickness)}; give the distance to the next surface, 0 or more"
+            )
         if glass is not None and each.thickness == 0.0:
             _fail(path, each.line, f"thickness of the {each.glass} is 0; give how thick it is on the axis")
         if not (math.isfinite(each.semi_diameter) and each.semi_diameter > 0.0):
-            _fail(path, each.line, f"semi_diameter is {each.semi_diameter:g}; give half the width that light may have")
+            _fail(
+                path, each.line, f"semi_diameter {_told(each.semi_diameter)}; give half the width that light may have"
+            )
         if not abs(each.conic) < _MOST_CONIC:
             _fail(path, each.line, f"conic is {each.conic:g}; give a number below {_MOST_CONIC:g}, 0 for a sphere")
         lengths = (each.semi_diameter, each.thickness if at < last else 0.0, 1.0 / abs(each.radius))
@@ -244,6 +249,10 @@ def _lens(path: Path, listed: Sequence[_Listed], makers: Sequence[str], notes: l
     lens = Lens(path.stem, tuple(surfaces), min(stops, default=None), units=units, notes=tuple(dict.fromkeys(notes)))
     widest_beam(lens)
     return lens
+
+
+def _told(value: float) -> str:
+    return "is missing" if math.isnan(value) else f"is {value:g}"
 
 
 def _glass(path: Path, listed: _Listed, makers: Sequence[str], notes: list[str]) -> Dispersion | None:

@@ -10,7 +10,6 @@ from imgui_bundle import ImVec2, imgui
 from ...edit import edits, presets
 from ...edit.glass import set_absorption, set_dispersion, set_priority, set_tint
 from ...edit.objects import set_material
-from ...edit.requests import MatchGlass
 from ...edit.state import State
 from ...model.materials.dielectric import MAX_PRIORITY
 from ...model.optics import glass
@@ -191,12 +190,6 @@ def _draw_buttons(state: State, view_model: ViewModel, index: int) -> State:
     )
     if widgets.button("As sold", tip=tip, enabled=sold is not None and not is_as_sold(dispersion)) and sold:
         state = edits.attempt(state, f"{sold.name} as sold", set_dispersion, index, sold)
-    widgets.beside("Find glass")
-    tip = "Rank the catalogue by the light on the scene's first flat receiver: which glass casts what is shown now?"
-    if widgets.button(
-        "Find glass", tip=tip, enabled=view_model.job is None and not state.scene.objects[index].material.is_crystal
-    ):
-        state = state.asking(MatchGlass(index))
     state = _draw_clipboard(state, index)
     if imgui.begin_popup(POPUP):
         imgui.begin_child("picker", ImVec2(theme.em(46.0), theme.em(30.0)))

@@ -1,34 +1,26 @@
-"""The selected stone in figures: light return, fire, scintillation, windows."""
+"""The selected stone in figures and pictures: light return, fire, scintillation, windows, ASET."""
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
-
-from ...base.not_yet import NotYet
+from ...base.errors import UserError
+from ...edit.requests import JudgeStone
 from ...edit.state import State
-from .. import item_rects
+from ...model.gems.in_scene import chosen_stone
 from ..view_model import ViewModel
 from . import widgets
+from .solve_panel import draw_found
 
 
 def draw_gem_panel(state: State, view_model: ViewModel) -> State:
     """Draw the panel's contents."""
-    found = view_model.gem
-    if isinstance(found, NotYet):
-        widgets.hint("Not yet: the stone's figures are being found.")
+    selected = state.scene.objects[state.selection.index] if state.selection.kind == "object" else None
+    try:
+        item = chosen_stone(state.scene, None if selected is None or selected.material.receives else selected.name)
+    except UserError as error:
+        widgets.hint(f"{str(error)[:1].upper()}{str(error)[1:]}.")
         return state
-    if isinstance(found, str):
-        widgets.hint(f"{found[:1].upper()}{found[1:]}.")
-        return state
-    name, figures = found
-    imgui.text_wrapped(f"{name}, alone in the air, seen from above its table (its own z).")
-    flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.sizing_fixed_fit | imgui.TableFlags_.scroll_y
-    if imgui.begin_table("##gem", 3, flags):
-        for title, value, meaning in figures.rows():
-            imgui.table_next_row()
-            for text in (title, value, meaning):
-                imgui.table_next_column()
-                imgui.text_unformatted(text)
-                item_rects.note(f"Gem: {title}")
-        imgui.end_table()
+    tip = "Alone in the air, seen from above its table (its own z): figures, ASET, ideal-scope, brightness, fire."
+    if widgets.button(f"Judge {item.name}###judge", tip=tip, enabled=view_model.job is None, width=-1):
+        state = state.asking(JudgeStone(item.name))
+    draw_found(view_model.found.get("gem"), item)
     return state

@@ -50,7 +50,6 @@ def _plate(state: State, view_model: ViewModel, index: int) -> State:
     if widgets.button("Check plate", tip=tip, enabled=target is not None and view_model.job is None, width=-1):
         assert target is not None
         state = state.asking(CheckPlate(index, target, distance or None))
-    if (found := view_model.plate) is not None:
-        of = item.mesh, item.object_to_world, item.material.dispersion, target, distance or None
-        draw_found(found, is_present=found.is_of(*of))
+    of = item.mesh, item.object_to_world, item.material.dispersion, target, distance or None
+    draw_found(view_model.found.get("plate"), *of)
     return state

@@ -57,9 +57,7 @@ def _derivative(state: State, view_model: ViewModel) -> State:
     tip = "Render the picture at either side of a small step, by the same random numbers, and take the difference."
     if widgets.button("Derive", tip=tip, enabled=view_model.job is None, width=-1):
         state = state.asking(Derive(chosen))
-    found = view_model.derivative
-    if found is not None:
-        draw_found(found, is_present=found.is_of(state.scene, state.camera, chosen))
+    draw_found(view_model.found.get("derivative"), state.scene, state.camera, chosen)
     return state
 
 
@@ -91,8 +89,7 @@ def _glass(state: State, view_model: ViewModel) -> State:
         state = state.asking(ask)
     if wanted != "light":
         state = _numbers(state, view_model, ask, ready=not missing)
-    if (found := view_model.answer) is not None:
-        draw_found(found, is_present=found.is_of(state.scene))
+    draw_found(view_model.found.get("answer"), state.scene)
     return state
 
 
@@ -125,9 +122,11 @@ def target_row(state: State, view_model: ViewModel, field: str, suffixes: tuple[
         file_browser.ask(file_browser.Question("Light that is wanted", suffixes, present or folder, chosen))
 
 
-def draw_found(found: Found, *, is_present: bool) -> None:
-    """What a job found, and a picture of it where there is one."""
-    if not is_present:
+def draw_found(found: Found | None, *of: object) -> None:
+    """What a job found, `of` what is there now or of what was before, and a picture of it where there is one."""
+    if found is None:
+        return
+    if not found.is_of(*of):
         widgets.note("Something has changed since: this was found before.")
     for label, text in found.rows:
         widgets.read_out(label if "." in label else label[:1].upper() + label[1:], text, tip=text)
