@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -175,18 +174,6 @@ def test_exposure_is_for_the_png_alone(render: Render) -> None:
     assert bright > 2.0 * dark
 
 
-def test_seconds_are_kept(render: Render, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("spectrasplat.commands.render.process_age_s", lambda: 0.001)
-    scene = PRISM_SCENE
-    full = luminance(render(scene, "--layer caustic --photons 100k")).sum()
-    started = time.perf_counter()
-    timed = luminance(render(scene, "--layer caustic --seconds 1")).sum()
-    # The last round may be foreseen to take too long; programs, the camera and other tests come on top.
-    assert 0.5 <= time.perf_counter() - started < 20.0
-    assert timed == pytest.approx(full, rel=0.03)
-    assert int(re.search(r"([\d,]+) photons", render.said)[1].replace(",", "")) >= 5_000  # type: ignore[attr-defined, index]
-
-
 def test_depth_darkens(render: Render) -> None:
     """One event leads into the slab and never out; two let most light through; the rest needs more."""
     scene = beam(SLAB.format(""))
@@ -201,30 +188,7 @@ def test_depth_darkens(render: Render) -> None:
     assert share(render, "lost_depth") == pytest.approx(0.0, abs=1e-6)
 
 
-def test_stats_close_the_balance(render: Render) -> None:
-    render(PRISM_SCENE, f"{LIGHT_ALONE} --stats --method srd")
-    # Beams are counted at three places of their bands; the finer they are, the nearer to all of it.
-    assert abs(share(render, "unaccounted")) <= 0.02
-    render(PRISM_SCENE, "--stats")
-    ended = {
-        name: share(render, name)
-        for name in ("deposited", "absorbed", "escaped", "direct", "lost_depth", "lost_numeric", "roulette")
-    }
-    assert abs(share(render, "unaccounted")) <= 1e-4
-    assert sum(ended.values()) == pytest.approx(1.0, abs=1e-4)
-    assert ended["deposited"] > 0.3 and ended["escaped"] > 0.01
-
-
 # -- materials and ways to open a scene --------------------------------------------------------
-
-
-def test_absorption_gives_its_colour_at_its_distance(render: Render) -> None:
-    colour = [0.8, 0.4, 0.1]
-    clear = render(beam(SLAB.format("")), "--layer caustic").rgb.sum(axis=(0, 1), dtype=np.float64)
-    options = f", absorption = {{ colour = {colour}, distance = 1.0 }}"
-    tinted = render(beam(SLAB.format(options)), "--layer caustic --stats").rgb.sum(axis=(0, 1), dtype=np.float64)
-    assert tinted / clear == pytest.approx(colour, abs=0.08)
-    assert share(render, "absorbed") > 0.3
 
 
 def test_water_in_a_glass(render: Render) -> None:
@@ -259,17 +223,6 @@ def test_overlap_belongs_to_the_higher_priority(render: Render) -> None:
     for first, second in ((1, 2), (2, 1), (0, 0)):  # one interface between the two, wherever it lies
         render(beam(lower.format(first) + upper.format(second)), f"{LIGHT_ALONE} --stats")
         assert share(render, "deposited") == pytest.approx(stack_transmittance(1.0, 2.4, 1.5, 1.0), abs=0.005)
-
-
-def test_a_cemented_doublet_has_three_surfaces(render: Render) -> None:
-    part = (
-        '[[objects]]\nshape = "doublet"\npart = "{}"\nradius1 = 3.0\nradius2 = -3.0\nradius3 = -30.0\n'
-        "thickness1 = 0.2\n"
-        'thickness2 = 0.1\ndiameter = 0.9\ntriangles = 8000\nglass = "{}"\nposition = [0, 0, 1]\n'
-    )
-    render(beam(part.format("front", "N-BK7") + part.format("back", "F2")), f"{LIGHT_ALONE} --stats")
-    assert share(render, "deposited") == pytest.approx(stack_transmittance(1.0, 1.5168, 1.62, 1.0), rel=0.01)
-    assert share(render, "lost_numeric") < 1e-4
 
 
 def test_a_mirror_casts_its_colour(render: Render) -> None:

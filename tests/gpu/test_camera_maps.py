@@ -24,7 +24,6 @@ from tests.gpu.camera_rig import (
     floor_points,
     horizontal,
     opened_camera_pass,
-    point_light_radiance,
     released,
     render,
     white_texels,
@@ -145,37 +144,6 @@ def test_samples_weigh_texels_by_their_share_of_the_pixel(gl):
     got = camera_pass.read_rgb()[..., 1]
     assert np.sqrt(np.mean((got - expected) ** 2)) < 0.06 * expected.mean()
     assert got.mean() == pytest.approx(expected.mean(), rel=5e-3)
-
-
-def test_caustic_layer_has_no_direct_light_and_beauty_adds_it(gl):
-    lamp = PointLight("lamp", WHITE, position=(0, 0, 1.5))
-    pictures = {}
-    for layer in ("beauty", "caustic"):
-        camera_pass = opened_camera_pass(gl, [floor()], [lamp], layer=layer, background=(5, 5, 5))
-        maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 4)], white_texels(np.full((4, 4), 7.0)))
-        camera_pass.run(ABOVE, 16, 16, 1, maps=maps)
-        pictures[layer] = camera_pass.read_rgb()[..., 1]
-    assert pictures["caustic"] == pytest.approx(REFLECTANCE / np.pi * 7.0, rel=1e-5)
-    direct = point_light_radiance(floor_points((16, 16), ABOVE), lamp.position)
-    assert pictures["beauty"] - pictures["caustic"] == pytest.approx(direct, rel=1e-3)
-
-
-def test_spectral_bins(gl):
-    """Six bins over two targets: map and light land in their bins and give the same white as XYZ does."""
-    edges = (380.0, 450.0, 500.0, 550.0, 600.0, 650.0, 780.0)
-    lamp = PointLight("lamp", spectrum.laser(532.0, 2.0), position=(0, 0, 2))
-    camera_pass = opened_camera_pass(gl, [floor()], [lamp], channels=MapChannels(edges))
-    energy = np.zeros((4, 4, 8))
-    energy[..., :6] = [1, 2, 3, 4, 5, 6]
-    maps = flat_maps(gl, camera_pass.scene, [(-2, -2, 4.0, 0, 0, 4)], energy)
-    camera_pass.run(ABOVE, 16, 16, 1, maps=maps)
-    bins = camera_pass.read_spectral()
-    assert bins.shape == (16, 16, 6)
-    direct = point_light_radiance(floor_points((16, 16), ABOVE), lamp.position, 2.0)
-    expected = REFLECTANCE / np.pi * np.array([1, 2, 3, 4, 5, 6]) * np.ones((16, 16, 1))
-    expected[..., 2] += direct
-    assert bins == pytest.approx(expected, rel=1e-4)
-    assert camera_pass.read_rgb().shape == (16, 16, 3)
 
 
 def test_spectra_of_less_light_than_none_keep_the_colour_of_the_map(gl):

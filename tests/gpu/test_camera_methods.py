@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.model.geometry import primitives
-from spectrasplat.model.lights import AreaLight, CollimatedLight
+from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.scene import (
@@ -158,66 +158,3 @@ def test_a_caustic_behind_matched_glass_keeps_its_light(behind_panes) -> None:
 def test_a_caustic_behind_matched_glass_has_its_colours(behind_panes) -> None:
     """What coarse spectra lack of XYZ is given back: without it they were 20 % off here."""
     assert difference(*behind_panes) < 0.02
-
-
-EDGES_NM = tuple(np.linspace(380.0, 780.0, 9).tolist())
-
-
-@pytest.mark.slow
-def test_light_and_camera_half_agree_on_a_lamp_behind_a_slab(gl) -> None:
-    """Reciprocity to 1.2 %: the irradiance that the light pass throws through a slab onto paper is what a camera on the
-    paper finds when it adds up the lamp it sees through the slab, L cos θ dΩ, in every bin.
-
-    The light pass follows sixteen wavelengths by themselves and is within half a per cent (of photons' lattices and
-    texels), the camera's eight bands leave as much grain. Fresnel's loss is 15 %, the slab lets the lamp seem 9 %
-    nearer, and both change by 2 % over the spectrum."""
-    lamp = AreaLight("lamp", FLAT, position=(0.0, 0.0, 3.0), direction=(0.0, 0.0, -1.0), radius=0.25)
-    turn = np.radians(25.0)
-    tilted = np.array(
-        [[np.cos(turn), 0, np.sin(turn), 0], [0, 1, 0, 0], [-np.sin(turn), 0, np.cos(turn), 1.5], [0, 0, 0, 1]]
-    )
-    slab = SceneObject("slab", primitives.box((9.0, 9.0, 0.6)), glass("N-SF11"), tilted)
-    paper = horizontal(-0.6, 0.6, -0.6, 0.6, 0.0, Diffuse((1.0, 1.0, 1.0)), "paper")
-    scene = Scene("reciprocity", Camera((0, -3, 1), (0, 0, 0)), (lamp,), (slab, paper))
-    maps = render_scene(
-        scene,
-        RenderSettings(width=64, height=64, photons=400_000, layer="map:paper", bins=8, method="regular-16"),
-        context=gl,
-    ).spectral
-    assert maps is not None
-    side = len(maps)
-    for x, y in ((0.0, 0.0), (0.35, -0.2)):
-        column, row = int((x + 0.6) / 1.2 * side), int((0.6 - y) / 1.2 * side)
-        patch = (
-            maps[row - side // 20 : row + side // 20, column - side // 20 : column + side // 20]
-            .astype(float)
-            .mean(axis=(0, 1))
-        )
-        camera = Camera((x, y, 1e-3), (0.12, 0.0, 3.0), up=(0, 1, 0), vertical_fov_deg=24.0)
-        camera_pass = opened_camera_pass(
-            gl, [slab, paper], [lamp], camera=camera, channels=MapChannels(EDGES_NM), split_threshold=1e-4
-        )
-        camera_pass.spectrum = Spectrum(8)
-        camera_pass.run(camera, 48, 48, 32)
-        radiance = camera_pass.read_spectral().astype(float)
-        released(camera_pass)
-        forward = np.array([0.12 - x, -y, 3.0 - 1e-3])
-        forward /= np.linalg.norm(forward)
-        assert radiance[:2].max() == radiance[-2:].max() == 0.0 < radiance.max()  # all of the lamp is in the picture
-        irradiance = sum_over_picture(radiance, camera, forward)
-        assert patch == pytest.approx(irradiance, rel=0.012)
-
-
-def sum_over_picture(radiance: np.ndarray, camera: Camera, forward: np.ndarray) -> np.ndarray:
-    """∫ L cos θ dΩ on a horizontal surface, of a square picture."""
-    side = len(radiance)
-    half = np.tan(np.radians(camera.vertical_fov_deg / 2))
-    right = np.cross(forward, camera.up)
-    right /= np.linalg.norm(right)
-    up = np.cross(right, forward)
-    offset = (2 * (np.arange(side) + 0.5) / side - 1) * half
-    way = forward + offset[None, :, None] * right - offset[:, None, None] * up
-    length = np.linalg.norm(way, axis=-1)
-    # A pixel's share of the sphere is its area on the plane at unit distance times cos³ of its angle off the axis.
-    weight = (2 * half / side) ** 2 / length**3 * way[..., 2] / length
-    return (radiance * weight[..., None]).sum(axis=(0, 1))

@@ -99,21 +99,6 @@ def test_highlights_are_antialiased_alike_in_window_files_and_float64(gl, displa
     assert (magnified[1::3, 1::3] == shown[5:12, 6:13]).all()
 
 
-def test_a_glint_smaller_than_a_pixel_is_a_dot() -> None:
-    """A hundred times white within a pixel: one white square before, now a dot that is as bright as it was and fades to
-    its sides, less where it is hardly overexposed. Below white nothing happens."""
-    for norm, sides in ((100.0, 4), (1.02, 4), (0.9, 0)):
-        rgb = np.full((7, 7, 3), 0.1, np.float32)
-        rgb[3, 3] = norm
-        plain, dotted = (tone_map.to_display(rgb, 0.0, antialias=on) for on in (False, True))
-        brighter = (dotted > plain + 1e-4).all(axis=-1)
-        assert brighter.sum() == sides and (dotted[3, 3] == plain[3, 3]).all()
-        if sides:
-            assert brighter[[2, 4, 3, 3], [3, 3, 2, 4]].all()
-            spread = 0.135 * min(norm - 1.0, 1.0)
-            assert dotted[2, 3] == pytest.approx(plain[2, 3] + spread * (plain[3, 3] - plain[2, 3]), rel=1e-3)
-
-
 @pytest.mark.parametrize(
     ("height", "width", "sides"), [(2, 2, 8), (1, 3, 8), (3, 3, 12), (4, 1, 0), (4, 4, 0), (1, 9, 0)]
 )
@@ -146,20 +131,6 @@ def test_highlights_of_pictures_of_other_sizes(gl, display, size: tuple[int, int
         small = rgb.reshape(size[1], k, size[0], k, 3).mean(axis=(1, 3))
         assert np.abs(shown - tone_map.tone_map_8bit(small, 0.0, antialias=True)).max() <= 1
     assert (shown > plain).any(axis=-1).mean() < 0.02 and 0.02 < (shown < plain - 10).any(axis=-1).mean() < 0.3
-
-
-def test_false_colour_and_errors_are_not_antialiased(gl, display) -> None:
-    rgb = overexposed_edges()
-    source, other = texture_of(gl, rgb), texture_of(gl, rgb[::-1])
-    size = (rgb.shape[1], rgb.shape[0])
-    for settings, compare in ((Settings(false_colour=True), None), (Settings(), Compare(mode="error"))):
-        pair = [
-            codes(display.run(source, settings, 0.0, size, other if compare else None, compare, antialias)).copy()
-            for antialias in (False, True)
-        ]
-        assert (pair[0] == pair[1]).all()
-    source.release()
-    other.release()
 
 
 @pytest.fixture
@@ -195,18 +166,6 @@ def test_the_own_curve_is_that_of_written_pictures(gl, display) -> None:
     assert clear.mean() > 0.8
     assert apart[clear].max() <= 1
     assert (shown[3, 5] == (255, 0, 255)).all() and (shown[9, 1] == (255, 0, 255)).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "curve"),
-    [("aces", tone.tone_aces), ("reinhard", tone.tone_reinhard), ("linear", lambda rgb: np.clip(rgb, 0, 1))],
-)
-def test_other_curves(gl, display, name: str, curve) -> None:
-    rgb = np.abs(colours(5)).reshape(64, 64, 3)
-    source = texture_of(gl, rgb)
-    shown = codes(display.run(source, replace(Settings(), tone=name), 1.0, (64, 64))).astype(int)
-    source.release()
-    assert np.abs(shown - 255 * tone.srgb_encode(curve(2.0 * rgb))).max() <= 1.0
 
 
 def test_false_colour_reads_in_stops_and_marks_what_is_out_of_range(gl, display) -> None:
@@ -283,33 +242,6 @@ def test_the_magnifier_shows_the_pixels_about_a_pixel_top_row_first(gl, display)
     assert (shown[8:12, 8:12] == 255).all()
     assert (shown[4:8, 8:12] == (0, 255, 0)).all()
     assert shown[12:].max() == 0 and shown[:4].max() == 0
-
-
-def test_a_broken_shader_keeps_the_last_good_programs(gl, display, monkeypatch, tmp_path) -> None:
-    import shutil
-
-    from spectrasplat.base import paths
-    from spectrasplat.gpu.shader import ShaderError, drop_programs
-
-    picture = flat(gl, 0.25)
-    before = codes(display.run(picture, Settings(), 0.0, (40, 10))).copy()
-    shutil.copytree(paths.shaders_dir(), tmp_path / "shaders")
-    source = tmp_path / "shaders" / "display/display.comp"
-    monkeypatch.setattr(paths, "shaders_dir", lambda: tmp_path / "shaders")
-    source.write_text(source.read_text().replace("void main()", "void main() oops"))
-    drop_programs(gl.ctx)  # as the viewer does before; tests share programs too
-    with pytest.raises(ShaderError, match=r"display\.comp:\d+"):
-        display.reload()
-    assert (codes(display.run(picture, Settings(), 0.0, (40, 10))) == before).all()
-    source.write_text(
-        source.read_text()
-        .replace("void main() oops", "void main()")
-        .replace("vec4(colour, 1.0)", "vec4(0.0, colour.gb, 1.0)")
-    )
-    drop_programs(gl.ctx)
-    display.reload()
-    assert codes(display.run(picture, Settings(), 0.0, (40, 10)))[..., 0].max() == 0
-    picture.release()
 
 
 @pytest.mark.parametrize("antialias", [False, True])

@@ -20,7 +20,7 @@ from spectrasplat.model.scene import Light, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.viewer.live_light import LiveLight
-from viewer_rig import table, turning, viewer
+from viewer_rig import pulling, turning, viewer
 
 
 def placed(scene: Scene, matrix: np.ndarray) -> Scene:
@@ -51,33 +51,6 @@ def triangles(buffers: SceneBuffers) -> np.ndarray:
 
 def shifted(lamp: Light, step: float) -> Light:
     return replace(lamp, position=(lamp.position[0] + step, *lamp.position[1:])) if lamp.has_place else lamp
-
-
-def pulling(before: LiveInputs, step: float | np.ndarray) -> LiveInputs:
-    """The first glass is dragged along x, or by a vector, of hundredths."""
-    objects = list(before.scene.objects)
-    at = next(i for i, o in enumerate(objects) if o.material.transmits)
-    matrix = objects[at].object_to_world.copy()
-    matrix[:3, 3] += 0.01 * (step if np.ndim(step) else np.array([step, 0.0, 0.0]))
-    objects[at] = replace(objects[at], object_to_world=matrix)
-    return replace(before, scene=replace(before.scene, objects=tuple(objects)))
-
-
-@pytest.mark.parametrize("name", ["prism", pytest.param("default", marks=pytest.mark.slow)])
-def test_a_frame_of_what_moves_asks_for_little(name: str) -> None:
-    with viewer(name) as rig:
-        for change in (pulling, turning):
-            seen, frames = set(), rig.frames(5, change)[2:]
-            for frame in frames:
-                counts = frame.counts
-                assert not (counts.made or counts.programs or counts.finishes), table([frame])
-                assert counts.written_bytes <= 16 << 10, table([frame])
-                # Of the frame before: where some of its photons landed, and what became of its batches.
-                assert counts.read_bytes <= 12 << 10, table([frame])
-                seen.add(frame.version)
-            assert len(seen) == 3
-            assert min(frame.python_ms for frame in frames) <= 3.0, table(frames)
-            rig.settle()
 
 
 def thrown(first: LiveInputs, count: int) -> Iterator[LiveInputs]:

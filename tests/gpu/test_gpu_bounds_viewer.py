@@ -1,4 +1,4 @@
-"""What a frame of the viewer asks of a GPU while the camera orbits and while a dispersion is dragged."""
+"""What a frame of the viewer asks of a GPU while the camera orbits, a dispersion is dragged and glass is moved."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from spectrasplat.passes.camera_tables import CameraTables
 from spectrasplat.passes.picture_channels import Channels
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.shown_spectra import ShownSpectra
-from viewer_rig import MOVEMENTS, doubled, dragging, roughened, viewer, with_gains
+from viewer_rig import MOVEMENTS, doubled, dragging, pulling, roughened, table, turning, viewer, with_gains
 
 MOST_BYTES = 64 << 10
 PYTHON_MS = {"orbit": 1.0, "drag": 3.0}
@@ -44,6 +44,17 @@ def test_a_viewer_makes_nothing_anew(name: str) -> None:
                 assert frame.counts.written_bytes <= MOST_BYTES / 2 and not frame.counts.waits, movement
             assert frames[-1].version > frames[2].version, "nothing was shown"
             assert min(frame.python_ms for frame in frames[2:]) <= bound, movement
+            rig.settle()
+        for change in (pulling, turning):
+            frames = rig.frames(5, change)[2:]
+            for frame in frames:
+                counts = frame.counts
+                assert not (counts.made or counts.programs or counts.finishes), table([frame])
+                assert counts.written_bytes <= MOST_BYTES / 4, table([frame])
+                # Of the frame before: where some of its photons landed, and what became of its batches.
+                assert counts.read_bytes <= 12 << 10, table([frame])
+            assert len({frame.version for frame in frames}) == 3
+            assert min(frame.python_ms for frame in frames) <= 3.0, table(frames)
             rig.settle()
 
 

@@ -63,7 +63,7 @@ def test_each_order_carries_its_share(gl: Context, kind: str, method: str) -> No
             assert found.tally.ended["absorbed"] / found.tally.emitted == pytest.approx(1.0 - kept, abs=1e-4)
 
 
-@pytest.mark.parametrize("kind", list(KINDS))
+@pytest.mark.parametrize("kind", ["blazed", *(pytest.param(k, marks=pytest.mark.slow) for k in KINDS if k != "blazed")])
 def test_the_camera_sees_the_shares_of_light_that_comes_back(gl: Context, kind: str) -> None:
     """White all round: a pixel has of each wavelength what all orders that lead to it leave of light from there."""
     made, camera = grating(kind), Camera((0.8, 0.0, 2.0), (0, 0, 0), (0, 1, 0), "orthographic", vertical_extent=0.5)

@@ -1,8 +1,8 @@
 """The known answers T1 to T16 by all that walks rays on the device: photons of the real emit and trace shaders, and the
 single rays of queries. T3 by camera pictures is in `test_camera_known_answers.py`.
 
-Float32: 1e-4 relative, mostly much better. Facets of curved shapes leave an error of second order in their width
-(`test_tessellation_gpu.py` shows the order): tolerances are that of the meshes used here where it is larger.
+Float32: 1e-4 relative, mostly much better. Facets of curved shapes leave an error of second order in their width:
+tolerances are that of the meshes used here where it is larger.
 """
 
 from __future__ import annotations

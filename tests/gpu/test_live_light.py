@@ -249,20 +249,6 @@ def test_a_dab_only_touches_its_place(gl: Context) -> None:
         assert after[..., 3].sum() == pytest.approx(before[..., 3].sum(), rel=2e-2)
 
 
-def test_solo_shows_one_colour(gl: Context) -> None:
-    scene = shipped("prism_case")
-    with live(gl, scene) as light:
-        trace(light)
-        rows = {}
-        for nm in (450.0, 550.0, 650.0):
-            picture = splat_again(light, inputs(scene, solo_nm=nm))
-            xyz = picture.sum(axis=(0, 1))[:3]
-            rows[nm] = (xyz / xyz.sum())[:2]
-        # Close to the spectral locus (CIE 1931): 450 nm (0.157, 0.018), 550 nm (0.302, 0.692), 650 nm (0.726, 0.274).
-        for nm, xy in ((450.0, (0.157, 0.018)), (550.0, (0.302, 0.692)), (650.0, (0.726, 0.274))):
-            assert np.allclose(rows[nm], xy, atol=0.02), (nm, rows[nm])
-
-
 def test_first_rounds_are_the_same_picture_only_coarser(gl: Context) -> None:
     with live(gl, shipped("prism"), photons=100_000) as light:
         trace(light, 100_000)

@@ -47,9 +47,3 @@ def test_portions_do_not_show(gl: Context, monkeypatch: pytest.MonkeyPatch) -> N
         assert np.abs(other - first).max() <= SAME * np.abs(first).max()
     # What is seen above is far less than chance, which another seed shows.
     assert np.abs(mutant - first).max() > 1e3 * SAME * np.abs(first).max()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_portions_show_in_no_scene(path: Path, gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
-    check(gl, path, monkeypatch)

@@ -49,17 +49,6 @@ def test_a_picture_is_written_and_shown(picture: ss.Picture, tmp_path: Path) -> 
         picture.to_exr(tmp_path / "a.png")
 
 
-def test_bins_sum_up_to_the_light_of_the_map() -> None:
-    scene = ss.load("prism")
-    plain = ss.caustic(scene, "table", size=(64, 64), photons=20_000)
-    binned = ss.caustic(scene, "table", size=(64, 64), photons=20_000, bins=8)
-    assert binned.spectral is not None and binned.spectral.shape[2] == 8 and len(binned.bin_edges_nm) == 9
-    assert binned.rgb.sum() == pytest.approx(plain.rgb.sum(), rel=0.02)
-    corners = plain.placement["corners_world"]
-    across = np.subtract(corners["bottom_right"], corners["bottom_left"])  # type: ignore[index]
-    assert np.linalg.norm(across) == pytest.approx(plain.placement["size_units"][0])  # type: ignore[index]
-
-
 def test_callbacks_come_in_the_callers_thread_and_can_stop() -> None:
     import threading
 

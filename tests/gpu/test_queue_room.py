@@ -12,7 +12,7 @@ from spectrasplat.model.materials.grating import Grating
 from spectrasplat.model.scene import Scene
 from spectrasplat.passes import pilot, ray_pool
 from spectrasplat.passes.lattice_slice import Band, LatticeSlice
-from spectrasplat.stress.rigs.probe import SMALL, light_pass, probe
+from spectrasplat.stress.rigs.probe import SMALL, light_pass
 
 ORDERS = 161
 FEW = 3
@@ -38,18 +38,6 @@ def test_a_slice_is_both_of_its_halves() -> None:
     assert sorted(points(halves[0]) + points(halves[1])) == points(whole)
     assert [half.points for half in halves] == [9, 8]
     assert [*points(whole.split(5)[0]), *points(whole.split(5)[1])] == points(whole)
-
-
-@pytest.mark.slow
-def test_full_queues_lose_nothing(gl, crowded: Scene) -> None:
-    """The picture is the same, however few paths are followed at once."""
-    settings = replace(SMALL, width=64, height=36, photons=8192, max_depth=FEW, spp=2)
-    # The larger queue holds all paths, the smaller one does not.
-    found = [probe(gl, crowded, replace(settings, batch=batch)) for batch in (65_536, 16_384)]
-    for one in found:
-        assert one.stats.tally.fallbacks["queue_overflow"] == 0
-        assert one.stats.tally.imbalance < 1e-5
-    assert found[0].picture == pytest.approx(found[1].picture, rel=1e-3, abs=1e-4 * float(found[0].picture.max()))
 
 
 def test_a_slice_that_overflows_is_traced_again_in_parts(gl, crowded: Scene, monkeypatch: pytest.MonkeyPatch) -> None:

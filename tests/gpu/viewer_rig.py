@@ -229,6 +229,16 @@ def turning(before: LiveInputs, step: float) -> LiveInputs:
     return replace(before, scene=replace(before.scene, objects=tuple(objects)))
 
 
+def pulling(before: LiveInputs, step: float | np.ndarray) -> LiveInputs:
+    """The first glass is dragged along x, or by a vector, of hundredths."""
+    objects = list(before.scene.objects)
+    at = next(i for i, o in enumerate(objects) if o.material.transmits)
+    matrix = objects[at].object_to_world.copy()
+    matrix[:3, 3] += 0.01 * (step if np.ndim(step) else np.array([step, 0.0, 0.0]))
+    objects[at] = replace(objects[at], object_to_world=matrix)
+    return replace(before, scene=replace(before.scene, objects=tuple(objects)))
+
+
 def roughened(before: LiveInputs) -> LiveInputs:
     """The first glass is ground."""
     objects = list(before.scene.objects)

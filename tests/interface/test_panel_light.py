@@ -19,7 +19,6 @@ from spectrasplat.model.scene import Dab
 from spectrasplat.ui.panels import file_browser, light_panel, light_spectrum, picture_choice
 from spectrasplat.ui.panels.brush_panel import draw_brush
 from spectrasplat.ui.panels.light_panel import angles_of, direction_of, draw_light
-from spectrasplat.ui.panels.light_spectrum import _LAMPS
 
 from tests.interface.panel_rig import PanelRig, receiver_of, scene_state
 
@@ -65,27 +64,6 @@ def test_another_kind_keeps_the_name_and_shows_its_own_rows(panel: PanelRig) -> 
     panel.type_into("Half angle", "12")
     assert panel.light.outer_half_angle_deg == 12.0
     assert panel.light.inner_half_angle_deg <= 12.0
-
-
-def test_spectrum_keeps_the_photometric_power(panel: PanelRig) -> None:
-    lumens = panel.light.spectral_power.luminous()
-    choose(panel, "Spectrum", "Black body")
-    assert spectrum_words(panel.light.spectral_power) == ("blackbody", pytest.approx(3200.0))
-    panel.type_into("Temperature", "5800")
-    assert spectrum_words(panel.light.spectral_power)[1] == pytest.approx(5800.0, rel=1e-5)
-    choose(panel, "Spectrum", "Spectral lines")
-    assert [nm for nm, _ in panel.light.spectral_power.lines] == [nm for nm, _ in _LAMPS["Mercury lamp"]]
-    choose(panel, "Lines", "Sodium lamp")
-    assert len(panel.light.spectral_power.lines) == 2
-    assert panel.light.spectral_power.luminous() == pytest.approx(lumens, rel=1e-9)
-
-
-def test_a_preset_is_a_spectrum_of_the_same_brightness(panel: PanelRig) -> None:
-    lumens = panel.light.spectral_power.luminous()
-    choose(panel, "Light presets…", "Mercury lamp")
-    assert panel.light.spectral_power.luminous() == pytest.approx(lumens, rel=1e-9)
-    assert panel.labels == ["Mercury lamp for slit"]
-    assert len(panel.light.spectral_power.lines) == 5
 
 
 def test_laser_slider_is_dragged_live(panel: PanelRig) -> None:
@@ -191,13 +169,6 @@ def painted(gl: Context) -> Iterator[PanelRig]:
         yield rig
 
 
-def test_clearing_takes_the_dabs_of_that_receiver(painted: PanelRig) -> None:
-    painted.click("Clear 3 dabs")
-    index = receiver_of(painted.state)
-    assert painted.state.scene.objects[index].local_dispersion == ()
-    assert painted.labels == [f"Clear dabs of {painted.state.scene.objects[index].name}"]
-
-
 def test_physical_picture_is_a_switch_that_edits_nothing(painted: PanelRig) -> None:
     scene = painted.state.scene
     painted.click("Physical picture")
@@ -217,10 +188,3 @@ def test_brush_settings_and_tools(painted: PanelRig) -> None:
     painted.click("Radius", count=2)
     view = painted.state.view
     assert painted.state.brush.radius == pytest.approx(USUAL_RADIUS * view.height_at(view.target_distance))
-
-
-def test_strength_of_the_eraser_leaves_that_of_the_others(painted: PanelRig) -> None:
-    painted.type_into("Strength", "4")
-    choose(painted, "Mode", "Erase")
-    choose(painted, "Mode", "Widen colours")
-    assert painted.state.brush.strength == 4.0

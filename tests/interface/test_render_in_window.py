@@ -15,7 +15,7 @@ from spectrasplat.edit import requests
 from spectrasplat.edit.drawn import Drawn, scrubbed
 from spectrasplat.edit.state import Key, State
 from spectrasplat.gpu.context import Context
-from spectrasplat.ui.export import Exports, _Developer
+from spectrasplat.ui.export import Exports
 from spectrasplat.ui.export_job import left_words
 from spectrasplat.ui.panels import export_panel, file_browser, keys_editor
 from spectrasplat.ui.panels.export_panel import draw_export
@@ -127,20 +127,6 @@ def test_cancelling_a_picture_keeps_what_is_done_and_again_drops_it(gl: Context,
     exports.step(0.0)
     assert exports.stop() is None
     assert (exports.stop() or "").startswith("Nothing was written") and exports.job is None and not path.exists()
-
-
-def test_a_written_picture_has_the_glare_of_its_lens_and_a_measured_one_has_not(gl: Context) -> None:
-    rgb = np.zeros((32, 32, 3), np.float32)
-    rgb[16, 16] = 100.0
-    look = replace(scene_state().scene.render, glare=0.2)
-    for settings, has_glare in (
-        (scene_state().display, True),
-        (replace(scene_state().display, false_colour=True), False),
-    ):
-        develop = _Developer(gl, settings)
-        dark, codes = develop(rgb, 0.0, replace(look, glare=0.0)), develop(rgb, 0.0, look)
-        develop.release()
-        assert (codes[12:20, 12:20].sum() > dark[12:20, 12:20].sum() + 200) == has_glare
 
 
 def test_what_cannot_be_rendered_is_refused_at_once(gl: Context, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -142,17 +141,6 @@ def test_undo_of_a_deletion_keeps_the_selection_in_range(rig: Rig) -> None:
     assert rig.ask(requests.Undo()).selection == Selection()
 
 
-def test_save_and_open_again(rig: Rig, tmp_path: Path) -> None:
-    rig.rename("mine")
-    target = tmp_path / "mine.toml"
-    rig.ask(requests.Save(target))
-    assert not rig.view_model.unsaved and rig.view_model.path == target and rig.view_model.recent == (target,)
-    rig.ask(requests.NewScene())
-    assert rig.view_model.path is None
-    assert rig.ask(requests.Open(target)).scene.name == "mine"
-    assert rig.view_model.history[0].is_present and len(rig.view_model.history) == 1
-
-
 def test_what_cannot_be_opened_or_saved_is_told_and_changes_nothing(rig: Rig, tmp_path: Path) -> None:
     before = rig.rename("kept").scene
     broken = tmp_path / "broken.toml"
@@ -175,11 +163,6 @@ def test_quitting_asks_only_where_work_would_be_lost(rig: Rig) -> None:
     assert not rig.view_model.asks_to_quit
     rig.ask(requests.Quit())
     rig.ask(requests.Quit(discard=True))
-    assert rig.session.wants_to_close
-
-
-def test_quitting_with_nothing_unsaved_closes(rig: Rig) -> None:
-    rig.ask(requests.Quit())
     assert rig.session.wants_to_close
 
 
@@ -223,21 +206,6 @@ def test_what_the_engine_cannot_show_is_told_once(rig: Rig) -> None:
     rig.ask(requests.DismissMessage("The maps of this scene are too large."))
     rig.frame()
     assert "The maps of this scene are too large." not in [m.text for m in rig.view_model.messages]
-
-
-def test_an_autosave_that_fails_says_so(rig: Rig, config: Path) -> None:
-    folder = config / "autosave"
-    shutil.rmtree(folder, ignore_errors=True)
-    config.mkdir(parents=True, exist_ok=True)
-    folder.write_text("a file where the folder should be", encoding="utf-8")
-    rig.rename("precious")
-    document = rig.session.document
-    rig.session.autosave.write_now(document.scene, document.title, document.source)
-    for _ in range(3):
-        rig.frame()
-    (told,) = [m for m in rig.view_model.messages if "autosaved" in m.text]
-    assert told.is_error
-    folder.unlink()
 
 
 def test_a_shader_error_is_shown_as_one(rig: Rig) -> None:
@@ -292,15 +260,6 @@ def test_facts_under_the_cursor(rig: Rig) -> None:
     rig.frame()
     rig.frame()
     assert rig.view_model.cursor is None
-
-
-def test_copy_material_and_frame_selection(rig: Rig) -> None:
-    state = rig.ask(requests.CopyMaterial(0))
-    assert state.clipboard is state.scene.objects[0].material
-    before = state.camera
-    rig.frame(lambda state: replace(state, selection=Selection("object", 1)))
-    after = rig.ask(requests.FrameSelection()).camera
-    assert after.target != before.target and after.vertical_fov_deg == before.vertical_fov_deg
 
 
 def test_settings_reach_the_engine_and_the_next_session(gl: Context, config: Path) -> None:

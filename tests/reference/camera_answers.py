@@ -32,17 +32,6 @@ def thin_prism_fringe(n_short: float, n_long: float, apex_rad: float, distance: 
     return float((n_short - n_long) * apex_rad * distance)
 
 
-def prism_deviation(n: Array | float, apex_rad: float, incidence_rad: Array | float) -> Array:
-    """Exact deviation toward the base in a principal section, rad; NaN where the second face reflects totally.
-
-    `incidence_rad`: on the first face, positive on the base's side of the normal.
-    """
-    n, incidence = np.asarray(n, float), np.asarray(incidence_rad, float)
-    sine = math.sin(apex_rad) * np.sqrt(n**2 - np.sin(incidence) ** 2) - np.cos(apex_rad) * np.sin(incidence)
-    leaving = np.arcsin(np.where(np.abs(sine) <= 1.0, sine, 0.0))
-    return np.where(np.abs(sine) <= 1.0, incidence + leaving - apex_rad, np.nan)
-
-
 # ---- plane-parallel slabs --------------------------------------------------------------------
 
 
@@ -63,33 +52,7 @@ def slab_lateral_shift(n: Array | float, thickness: float, incidence_rad: float)
     return slab_displacement(n, thickness, incidence_rad) * math.cos(incidence_rad)
 
 
-def slab_displacement_derivative(
-    n: Array | float, dn_dnm: Array | float, thickness: float, incidence_rad: float
-) -> Array:
-    """∂(`slab_displacement`)/∂λ, units per nm, for a glass of slope `dn_dnm`: t s n n'/(n² − s²)^1.5."""
-    n, sine = np.asarray(n, float), math.sin(incidence_rad)
-    return thickness * sine * n * np.asarray(dn_dnm, float) / (n**2 - sine**2) ** 1.5
-
-
 # ---- plano-convex lenses (§ 4.4) -------------------------------------------------------------
-
-
-def plano_convex_focal_length(n: Array | float, radius: float) -> Array:
-    """R/(n − 1), at any thickness (the plane has no power)."""
-    return radius / (np.asarray(n, float) - 1.0)
-
-
-def thin_lens_magnification(focal_length: Array | float, object_distance: float) -> Array:
-    """Of the upright virtual image of what lies within the focal length: m = f/(f − s)."""
-    focal_length = np.asarray(focal_length, float)
-    return focal_length / (focal_length - object_distance)
-
-
-def seen_tangent(focal_length: Array | float, camera_distance: float, object_distance: float, height: float) -> Array:
-    """tan of the angle at which a camera before a thin lens sees a point `height` off the axis behind it: m y/(d + m
-    s)."""
-    m = thin_lens_magnification(focal_length, object_distance)
-    return m * height / (camera_distance + m * object_distance)
 
 
 def thick_seen_tangent(

@@ -16,7 +16,6 @@ import numpy as np
 GLASS, MIRROR, BLACK, RECEIVER = range(4)
 _CONTACT = 1e-8
 _CHUNK = 250_000
-_PARALLEL_RECTANGLE, _PARALLEL_DISC, _POINT_RECTANGLE, _POINT_CONE = range(4)
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-REACH = np.sqrt(7.0)
-
 
 def henyey_greenstein(cosine: np.ndarray, g: np.ndarray | float) -> np.ndarray:
     """Phase function, 1/sr; `g`: mean cosine [Henyey and Greenstein 1941]."""
     return (1.0 - np.square(g)) / (4.0 * np.pi * (1.0 + np.square(g) - 2.0 * g * cosine) ** 1.5)
-
-
-def blur_1d(distance: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """The biweight kernel of this standard deviation."""
-    half = REACH * deviation
-    return 15.0 / 16.0 * np.maximum(1.0 - np.square(distance / half), 0.0) ** 2 / half
 
 
 def nearest(start: np.ndarray, beam: np.ndarray, ray: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

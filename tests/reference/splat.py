@@ -38,14 +38,3 @@ def swept_gaussian(
         for node, part in zip(0.5 * (low + high) + 0.5 * (high - low) * x, 0.5 * (high - low) * weight, strict=True):
             total += part * gaussian(points, p0 + (node - anchor) * velocity, covariance)
     return total
-
-
-def texel_average(density, centre: np.ndarray, size: float, nodes: int = 12) -> np.ndarray:
-    """Average of `density(points (..., 2))` over the square texel about each `centre` (..., 2)."""
-    x, weight = np.polynomial.legendre.leggauss(nodes)
-    total = np.zeros(np.shape(centre)[:-1])
-    for i in range(nodes):
-        for j in range(nodes):
-            offset = 0.5 * size * np.array([x[i], x[j]])
-            total += 0.25 * weight[i] * weight[j] * density(centre + offset)
-    return total

@@ -118,10 +118,3 @@ def test_roulette_keeps_the_mean_and_follows_its_seed() -> None:
     error = found.std() / np.sqrt(len(found))
     assert 0.0 < error < 1e-2 * exact
     assert abs(found.mean() - exact) < 4.5 * error
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["prism", "step cut", "brilliant", "amici", "L", "two stones"])
-def test_polygons_hold_what_a_hundred_million_rays_find(name: str) -> None:
-    total, by_cell = compare(CASES[name], 100_000_000, 1e-8, 1e-3, 80)
-    assert agree(total, by_cell), (total, by_cell)

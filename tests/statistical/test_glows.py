@@ -19,7 +19,6 @@ from spectrasplat.gpu.context import Context
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes import trace
 from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
@@ -153,14 +152,6 @@ def test_directions_are_believed_no_further_than_one_photon_stands_for(
     gl: Context, ellipsoid: Scene, truth: np.ndarray
 ) -> None:
     assert deviation(drawn(gl, ellipsoid, 200_000), truth) < SPREAD
-
-
-@pytest.mark.slow
-def test_believed_without_bound_they_spread_light(
-    gl: Context, ellipsoid: Scene, truth: np.ndarray, monkeypatch
-) -> None:
-    monkeypatch.setattr(trace, "WIDEST_TURN", 1e9)
-    assert deviation(drawn(gl, ellipsoid, 200_000), truth) > 1.1 * SPREAD
 
 
 GROUND_BOUND, GROUND_PHOTONS = 0.09, 40_000

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
-from spectrasplat.base.errors import UserError
 from spectrasplat.model.geometry import bvh
 from spectrasplat.model.geometry.bvh import MAX_DEPTH, MAX_LEAF, Bvh, build_bvh
 
@@ -265,23 +260,3 @@ def test_an_unusable_cache_folder_only_costs_time(tmp_path, monkeypatch) -> None
 def test_wrong_input_is_refused(triangles: np.ndarray) -> None:
     with pytest.raises(ValueError, match="triangles_xyz"):
         build_bvh(triangles)
-
-
-def test_a_missing_numba_is_told_in_a_sentence(monkeypatch) -> None:
-    monkeypatch.delattr("spectrasplat.model.geometry.bvh_build", raising=False)
-    monkeypatch.setitem(sys.modules, "spectrasplat.model.geometry.bvh_build", None)
-    with pytest.raises(UserError, match="needs numba.*pip install numba"):
-        build_bvh(soup(10), use_cache=False)
-
-
-def test_the_builder_compiles_where_no_cache_folder_can_be_written() -> None:
-    # In a process of its own: what numba has once compiled stays in this one.
-    program = """
-import numpy as np
-from numba.core import caching
-caching.CacheImpl._locator_classes = []
-from spectrasplat.model.geometry import bvh_build
-half_area = bvh_build._half_area(np.array([0.0, 0.0, 0.0, 1.0, 2.0, 3.0]))
-assert half_area == 11.0, half_area
-"""
-    subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(bvh.__file__).parents[3])

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import pytest
 from PIL import Image
-from spectrasplat import __version__
 from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.commands import options
@@ -179,18 +178,6 @@ class TestRender:
         assert "stopped early" in capsys.readouterr().out
         assert signal.getsignal(signal.SIGINT) is before
 
-    def test_a_picture_beyond_memory(
-        self,
-        renderer: FakeRenderer,
-        scene_path: Path,
-        tmp_path: Path,
-        capsys: pytest.CaptureFixture[str],
-        monkeypatch: pytest.MonkeyPatch,
-    ) -> None:
-        monkeypatch.setattr("spectrasplat.base.memory.available_bytes", lambda: 1 << 30)
-        told = complaint(capsys, "render", scene_path, "-o", tmp_path / "o.exr", "--size", "4096x4096", "--bins", "32")
-        assert "--size 4096x4096 with --bins 32 needs about 6.2 GiB and 1.0 GiB are left" in told
-
     def test_a_failing_renderer_leaves_the_old_picture(
         self,
         renderer: FakeRenderer,
@@ -296,20 +283,6 @@ class TestProgram:
 
     def test_every_part_of_the_proof_can_be_chosen(self) -> None:
         assert [part.key for part in PARTS] == ["doctor", *PROOF_PARTS, *MEASURED_PARTS]
-
-    def test_help_without_arguments(self, capsys: pytest.CaptureFixture[str]) -> None:
-        assert main([]) == 0
-        out = capsys.readouterr().out
-        for command in ("render", "inspect", "glass", "doctor", "bench-view"):
-            assert command in out
-
-    def test_commands_of_a_farm_are_listed(self, capsys: pytest.CaptureFixture[str]) -> None:
-        assert main(["farm"]) == 2
-        assert "\n  animate  Render an animation" in capsys.readouterr().err
-
-    def test_version(self, capsys: pytest.CaptureFixture[str]) -> None:
-        assert main(["--version"]) == 0
-        assert capsys.readouterr().out == f"spectrasplat {__version__}\n"
 
     @pytest.mark.parametrize(
         ("arguments", "sentence"),

@@ -60,30 +60,6 @@ def test_greys_are_flat() -> None:
     np.testing.assert_allclose(rgb_basis() @ np.full(3, 0.18), 0.18, rtol=1e-15)
 
 
-def test_no_small_admissible_change_makes_it_smoother() -> None:
-    """First-order optimality: along any direction that keeps sums, colours and bounds, roughness does not fall."""
-    basis, rng = rgb_basis(), np.random.default_rng(8)
-    daylight = daylight_per_lumen()
-    weights = (daylight[:, None] * cmf_xyz()).T
-    free = basis > 1e-9
-    # Wavelengths where all three curves may move either way, so that a small step keeps the bounds.
-    inside = np.flatnonzero(free.all(axis=1))
-    assert inside.size > 20
-    gradient = -2.0 * np.diff(np.pad(basis, ((1, 1), (0, 0)), mode="edge"), n=2, axis=0)
-    for _ in range(50):
-        step = np.zeros((401, 3))
-        for channel in range(2):
-            noise = rng.normal(size=inside.size)
-            rows = weights[:, inside]
-            noise -= rows.T @ np.linalg.lstsq(rows.T, noise, rcond=None)[0]
-            step[inside, channel] = noise
-        step[:, 2] = -step[:, 0] - step[:, 1]
-        assert np.abs(weights @ step).max() < 1e-9
-        assert abs((gradient * step).sum()) < 1e-7 * np.linalg.norm(step)
-        scale = 0.5 * basis[inside].min() / np.abs(step).max()
-        assert roughness(basis + scale * step) > roughness(basis)
-
-
 def test_the_curves_are_smooth_and_in_order() -> None:
     """No step above 1/30 per nm, and each curve is the largest where its primary's hue lies."""
     basis = rgb_basis()

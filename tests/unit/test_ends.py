@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import signal
 import subprocess
 import sys
@@ -15,7 +14,7 @@ import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.base.interrupts import Interruption, Terminated, exit_code_of, interrupt_flag, signals_raise
 
-from tests.fuzz.kills import COMMANDS, SCENE, kill_one, left_behind
+from tests.fuzz.kills import SCENE, kill_one
 
 TINY = ["render", "scene.toml", "-o", "out.npy", "--size", "16x9", "--photons", "1k", "--spp", "1"]
 
@@ -101,29 +100,6 @@ def test_the_picture_is_there_whatever_becomes_of_what_is_printed(folder: Path, 
     assert np.load(folder / "out.npy").shape == (9, 16, 3)
     if redirected == ">/dev/full":
         assert done.stderr.splitlines()[-1].startswith("spectrasplat: what was to be printed is lost: No space left")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda command: f"{command[0]} {command[-1]}")
-@pytest.mark.parametrize("limit", [0, 400, 4096])
-def test_a_full_disk_is_one_sentence_and_leaves_nothing(folder: Path, command: tuple[str, ...], limit: int) -> None:
-    def limited() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-
-    done = subprocess.run(
-        [sys.executable, "-m", "spectrasplat", *command],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=limited,
-    )
-    told = done.stderr.strip().splitlines()
-    if done.returncode != 0:
-        assert done.returncode == 2 and told[-1].startswith("spectrasplat: cannot write "), done.stderr
-    assert "Traceback" not in done.stderr, done.stderr
-    assert left_behind(folder, killed=False) == []
 
 
 def test_an_error_of_the_disk_elsewhere_is_still_a_bug(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,24 +51,6 @@ def test_one_layer_is_as_airy_says(nm: float, degrees: float) -> None:
     np.testing.assert_allclose(passed, 1.0 - expected, atol=1e-12)
 
 
-def test_a_quarter_wave_reflects_least() -> None:
-    nm = np.linspace(450.0, 650.0, 2001)
-    reflected, _ = power(stack((1.38, 550.0 / (4.0 * 1.38))), 1.0, nm)
-    assert nm[reflected.argmin()] == pytest.approx(550.0, abs=0.2)
-    assert reflected.min() == pytest.approx(((1.52 - 1.38**2) / (1.52 + 1.38**2)) ** 2, abs=1e-9)
-    perfect, _ = power(stack((1.52**0.5, 550.0 / (4.0 * 1.52**0.5))), 1.0, np.array([550.0]))
-    assert perfect[0] < 1e-12
-
-
-def test_a_bragg_stack() -> None:
-    """N pairs of quarter waves: R = ((n₀ n_L²ᴺ − n_s n_H²ᴺ) / (n₀ n_L²ᴺ + n_s n_H²ᴺ))², high index outside."""
-    for pairs in (1, 5, 12):
-        layers = ((2.35, 600.0 / (4.0 * 2.35)), (1.46, 600.0 / (4.0 * 1.46))) * pairs
-        reflected, _ = power(stack(*layers), 1.0, np.array([600.0]))
-        y = (2.35 / 1.46) ** (2 * pairs) * 1.52
-        assert reflected[0] == pytest.approx(((1.0 - y) / (1.0 + y)) ** 2, abs=1e-12)
-
-
 def test_energy() -> None:
     """What is clear loses nothing, a thousand layers neither, and metal no less than nothing; both sides let as much
     through."""

@@ -259,14 +259,6 @@ def test_index_out_of_range_names_the_face(tmp_path: Path) -> None:
         load_gltf(builder.written(tmp_path / "m.glb"))
 
 
-@pytest.mark.parametrize("fraction", np.linspace(0.0, 0.99, 23))
-def test_glb_cut_anywhere_is_refused(tmp_path: Path, fraction: float) -> None:
-    whole = Builder().tetrahedron().written(tmp_path / "m.glb").read_bytes()
-    (tmp_path / "cut.glb").write_bytes(whole[: int(fraction * len(whole))])
-    with pytest.raises(UserError, match="cut.glb"):
-        load_gltf(tmp_path / "cut.glb")
-
-
 @pytest.mark.parametrize(
     ("at", "number", "says"),
     [
@@ -281,23 +273,6 @@ def test_a_header_that_lies_is_refused(tmp_path: Path, at: int, number: int, say
     (tmp_path / "m.glb").write_bytes(data)
     with pytest.raises(UserError, match=says):
         load_gltf(tmp_path / "m.glb")
-
-
-def test_random_damage_never_gives_a_traceback(tmp_path: Path) -> None:
-    builder = Builder().tetrahedron(glass_material())
-    whole = bytearray(builder.written(tmp_path / "m.glb").read_bytes())
-    rng = np.random.default_rng(5)
-    refused = 0
-    for _ in range(150):
-        damaged = bytearray(whole)
-        for at in rng.integers(12, len(whole), 3):
-            damaged[at] = rng.integers(0, 256)
-        (tmp_path / "d.glb").write_bytes(damaged)
-        try:
-            load_gltf(tmp_path / "d.glb")
-        except UserError:
-            refused += 1
-    assert refused > 50
 
 
 def test_not_a_glb_and_missing_buffer_file(tmp_path: Path) -> None:

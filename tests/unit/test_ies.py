@@ -20,7 +20,7 @@ from spectrasplat.model.io.gltf_write import save_gltf
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.lights import IesLight
-from spectrasplat.model.lights.ies_file import MAX_BYTES, Profile, read_ies
+from spectrasplat.model.lights.ies_file import Profile, read_ies
 from spectrasplat.model.optics.spectrum import constant
 from spectrasplat.model.scene import Scene
 
@@ -185,17 +185,6 @@ def test_what_cannot_be_read_is_said_in_one_sentence(tmp_path: Path, text: str, 
         read(tmp_path, text)
     sentence = str(caught.value)
     assert told in sentence and "lamp.ies" in sentence and "; " in sentence and "\n" not in sentence
-
-
-def test_only_short_regular_files_are_read(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match="is not a file; choose"):
-        read_ies(tmp_path)
-    with pytest.raises(UserError, match="is not a file; choose"):
-        read_ies(tmp_path / "none.ies")
-    long = tmp_path / "long.ies"
-    long.write_bytes(b" " * (MAX_BYTES + 1))
-    with pytest.raises(UserError, match="longer than 1 MiB"):
-        read_ies(long)
 
 
 # -- in scenes --------------------------------------------------------------------------------

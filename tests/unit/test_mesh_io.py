@@ -210,15 +210,6 @@ def test_lying_file_is_one_sentence(tmp_path: Path, name: str) -> None:
     assert name in str(caught.value) and "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("fraction", np.linspace(0.02, 0.98, 13))
-@pytest.mark.parametrize("suffix", [".ply", ".stl"])
-def test_file_cut_anywhere_is_refused(tmp_path: Path, suffix: str, fraction: float) -> None:
-    save_ply(primitives.sphere(1.0, 80), tmp_path / "whole.ply")
-    whole = (tmp_path / "whole.ply").read_bytes() if suffix == ".ply" else _binary_stl(primitives.sphere(1.0, 80))
-    with pytest.raises(UserError):
-        load_mesh(_write(tmp_path, "cut" + suffix, whole[: int(fraction * len(whole))]))
-
-
 def test_missing_file_and_bad_crease(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"nothing\.ply: no such mesh file"):
         load_mesh(tmp_path / "nothing.ply")

@@ -126,12 +126,6 @@ def test_tests_pass_their_arguments_on(machine: Machine, script: str) -> None:
     assert f"--editable {machine.root}[test]" in machine.log.read_text()
 
 
-def test_all_takes_the_marks_away(machine: Machine) -> None:
-    assert (
-        machine.call("test", "--all", "-x").stdout == "tests: -n auto --dist loadfile --no-loadscope-reorder -m  -x\n"
-    )
-
-
 def test_no_python(machine: Machine) -> None:
     (machine.bin / "python3").unlink()
     done = machine.call("run")

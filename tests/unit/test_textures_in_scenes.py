@@ -150,12 +150,6 @@ def test_each_kind_of_environment_is_read(folder: Path) -> None:
         np.testing.assert_allclose(scene.environment.rgb, np.broadcast_to(expected, (8, 16, 3)))
 
 
-def test_notes_on_a_map_reach_the_scene(folder: Path) -> None:
-    write_image(folder / "wide.npy", np.ones((4, 9, 3)))
-    scene = load(folder, CAMERA + BALL + '[environment]\nkind = "map"\nfile = "wide.npy"\n')
-    assert any("9 × 4" in note for note in scene.notes)
-
-
 @pytest.mark.parametrize(
     ("lines", "expected"),
     [
@@ -252,12 +246,6 @@ def test_an_environment_made_in_memory_is_saved_with_its_picture(folder: Path) -
     back = again(replace(scene, environment=made), folder / "copy.toml")
     np.testing.assert_array_equal(back.environment.rgb, made.rgb)
     np.testing.assert_allclose(back.environment.world_to_local, made.world_to_local, atol=1e-12)
-
-
-def test_the_background_survives_as_before(folder: Path) -> None:
-    scene = load(folder, "background = [0.1, 0.2, 3]\n" + LIGHT + BALL + TABLE + 'material = "diffuse"')
-    back = again(scene, folder / "copy.toml")
-    assert back.background_rgb == (0.1, 0.2, 3.0) and back.environment is None
 
 
 # -- texture coordinates ------------------------------------------------------------------

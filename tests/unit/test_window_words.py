@@ -9,58 +9,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from spectrasplat.base.errors import UserError
-from spectrasplat.base.memory import check_picture_memory
 from spectrasplat.base.paths import shipped_scenes
-from spectrasplat.edit.opening import open_scene
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_save import save_scene
-from spectrasplat.model.staging import Staging, opaque_note
-from spectrasplat.render.notices import loss_notices
-from spectrasplat.ui.message_box import MessageBox, in_window
+from spectrasplat.ui.message_box import in_window
 from spectrasplat.ui.panels import numbers
-
-SOLID = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
-MORE = "v 3 0 0\nv 4 0 0\nv 3 1 0\nv 3 0 1\nf 5 7 6\nf 5 6 8\nf 6 7 8\nf 5 8 7\n"
-
-
-@pytest.mark.parametrize("text", [SOLID, f"o one\n{SOLID}o two\n{MORE}"])
-def test_notes_of_a_mesh_name_what_the_window_has(tmp_path: Path, text: str) -> None:
-    path = tmp_path / "ball.obj"
-    path.write_text(text, encoding="utf-8")
-    notes = load_scene(path).notes
-    assert any("--glass" in note for note in notes) and any("--up" in note for note in notes)
-    box = MessageBox(clock=lambda: 0.0)
-    for note in notes:
-        box.show(note)
-    told = " ".join(message.text for message in box.messages())
-    assert "--" not in told and "Dispersion panel" in told and "button on the picture" in told
-    assert ("it holds 'one', 'two'" in told) == ("o two" in text)
-
-
-def test_nothing_of_glass_and_what_was_lost(tmp_path: Path) -> None:
-    path = tmp_path / "card.toml"
-    path.write_text('[[objects]]\nname = "card"\nshape = "box"\nmaterial = "diffuse"\n', encoding="utf-8")
-    note = opaque_note(open_scene(path).objects)
-    assert note is not None and "--glass" in note
-    told = in_window(note)
-    assert "--" not in told and "Make glass, on the picture. The file holds 'card'" in told
-    (lost,) = loss_notices({"lost_depth": 0.3}, 64)
-    assert "Longest path" in in_window(lost) and "--" not in in_window(lost)
-
-
-def test_refusals(tmp_path: Path) -> None:
-    with pytest.raises(UserError) as error:
-        check_picture_memory(60_000, 60_000, 400)
-    told = in_window(str(error.value))
-    assert told.startswith("A picture of 60000x60000 with 400 spectral bins needs about")
-    path = tmp_path / "ball.obj"
-    path.write_text(SOLID, encoding="utf-8")
-    for glass in ((None, "N-SF99"), ("sphere", "N-SF11")):
-        with pytest.raises(UserError) as error:
-            load_scene(path, Staging(glass=(glass,)))
-        assert "--glass" in str(error.value) and "--" not in in_window(str(error.value))
-
 
 OF_THE_COMMAND_LINE_ALONE = (
     "animation.py",
