@@ -4,7 +4,6 @@ import {BEAM, PHOTON} from "./records.js";
 import {COUNT, FIRST_NM, SAMPLES, valueAt} from "./spectra.js";
 
 const STEP_NM = 10;
-
 const BINS = Array.from({ length: Math.floor(COUNT / STEP_NM) }, (_, k) => FIRST_NM + STEP_NM * (k + 0.5));
 
 // W a bin: lines and all.

@@ -16,6 +16,11 @@ vec4 rect_of(int level) {
   vec2 s = vec2(size), low = level == 0 ? vec2(0.0) : vec2(s.x, s.y - s.y * exp2(float(1 - level)));
   return vec4(low, low + s * exp2(float(-level)));
 }
+// How m times a place moves with it, where that is seen, homogeneous.
+mat2 jacobian(mat3 m, vec3 seen) {
+  vec2 at = seen.xy / seen.z;
+  return mat2(m[0].xy - at * m[0].z, m[1].xy - at * m[1].z) / seen.z;
+}
 // Area on the receiver of the texel about a place.
 float texel_area(vec2 texel) {
   float w = (to_uv * vec3(texel, 1.0)).z;
@@ -29,12 +34,11 @@ uniform sampler2D light;    // by row: energy below each place of the support; l
 uniform vec2 support;       // x of the light's ends
 uniform int lines;
 const int SAMPLES = 2048;
-vec3 energy_below(int row, float x) {
-  float at = clamp((x - support.x) / (support.y - support.x), 0.0, 1.0) * float(SAMPLES - 1);
-  int i = min(int(at), SAMPLES - 2);
-  vec3 below = texelFetch(light, ivec2(i, row), 0).rgb;
-  return below + (at - float(i)) * (texelFetch(light, ivec2(i + 1, row), 0).rgb - below);
+vec4 interpolated(sampler2D table, int row, float share) {
+  float at = clamp(share, 0.0, 1.0) * float(SAMPLES - 1), i = min(floor(at), float(SAMPLES - 2));
+  return mix(texelFetch(table, ivec2(i, row), 0), texelFetch(table, ivec2(i + 1.0, row), 0), at - i);
 }
+vec3 energy_below(int row, float x) { return interpolated(light, row, (x - support.x) / (support.y - support.x)).rgb; }
 vec4 line_of(int row, int k) { return texelFetch(light, ivec2(SAMPLES + k, row), 0); }
 `;
 
@@ -56,31 +60,27 @@ float error_function(float x) {
   p *= p; p *= p; p *= p; p *= p;
   return sign(x) * (1.0 - 1.0 / p);
 }
-float normal(float z) { return 0.39894228 * exp(-0.5 * z * z); }
 float below_normal(float z) { return 0.5 + 0.5 * error_function(clamp(z, -8.0, 8.0) * SQRT_HALF); }
-float excess(float z) { return normal(z) - z * (1.0 - below_normal(z)); }
+float excess(float z) { return 0.39894228 * exp(-0.5 * z * z) - z * (1.0 - below_normal(z)); }
 `;
 
-export const SPLAT_VERTEX = COMMON + TABLES + RECORDS(6) + GAUSSIAN + `
+// Of a splat. What lies away from its centre, in parts of texels, is turned to corners (-1 to 1), which the fan widens;
+// those to along and across, to cycles, and to how far inside of the light's edge, 0 to 1 over its blur.
+const SPLAT = (way) => `
+flat ${way} vec4 band, rect;     // x: from, anchor, to; standard deviation; texels of its level
+flat ${way} vec4 shape;          // half a texel across, along; 1 / its width; row
+flat ${way} vec3 weights, ripple, lit;  // throughput at the anchor, its slopes below and above; waves' heights
+flat ${way} float fine;          // parts of a texel's side, each of which is drawn
+flat ${way} mat2 to_corner, cycles;
+flat ${way} vec2 centre, widening, spread;
+`;
+
+export const SPLAT_VERTEX = COMMON + TABLES + RECORDS(6) + GAUSSIAN + SPLAT("out") + `
 uniform float smoothing, finest;  // spacings; parts of a texel's side in which what is small is drawn
-vec4 place_v2;  // where the anchor lands; change with the third index
-vec4 v01;       // change with the first and the second index
-vec4 span;      // x: from, anchor, to; row of the light's table
-flat out vec4 band, rect;  // x: from, anchor, to; standard deviation; texels of its level
-flat out vec4 shape;      // half a texel across, along; 1 / its width; row
-flat out vec3 weights, ripple;  // throughput at the anchor, its slopes below and above; waves' heights
-flat out float fine;      // parts of a texel's side, each of which is drawn
-out vec4 at;              // across, along (0 to 1), cycles
-out float lit;            // how far inside of the light's edge, 0 to 1 over its blur
+vec4 place_v2, v01, span;  // its place, change with the third index; with the others; x: from, anchor, to; light's row
 const float TEXEL = 1.0 / 12.0, NARROWED = 0.4 / 0.45;
-vec4 indices_at(int row, float x) {
-  float place = clamp(x, 0.0, 1.0) * float(SAMPLES - 1);
-  int i = min(int(place), SAMPLES - 2);
-  vec4 below = texelFetch(paths, ivec2(i, row), 0);
-  return below + (place - float(i)) * (texelFetch(paths, ivec2(i + 1, row), 0) - below);
-}
 vec2 shift_to(float x) {
-  vec4 n = indices_at(0, x) - indices_at(1, span.y);
+  vec4 n = interpolated(paths, 0, x) - interpolated(paths, 1, span.y);
   return n.x * v01.xy + n.y * v01.zw + n.z * place_v2.zw;
 }
 // Point of the emission lattice, in steps of which three are the shortest (shaders/lib/lattice.glsl there): its two
@@ -99,12 +99,11 @@ vec2 longest_axis(float ss, float st, float tt) {
 float cross2(vec2 a, vec2 b) { return a.x * b.y - a.y * b.x; }
 float sinc(float x) { float a = 3.14159265 * x; return abs(a) < 1e-2 ? 1.0 - a * a / 6.0 : sin(a) / a; }
 // What is drawn, in its own frame, texels: its Fourier transform at k cycles a texel.
-vec2 along, across;
+vec2 e, m;  // along, across
 float shear, box, across2, along2;
-float damping(vec2 k, float swept) {
-  float ka = dot(k, along), kc = dot(k, across) + shear * ka;
-  return exp(-0.5 * TWO_PI * TWO_PI * (across2 * kc * kc + along2 * ka * ka)) * sinc(box * kc)
-    * sinc(box * ka) * sinc(swept * ka);
+float damping(vec2 k) {
+  float ka = dot(k, e), kc = dot(k, m) + shear * ka;
+  return exp(-0.5 * TWO_PI * TWO_PI * (across2 * kc * kc + along2 * ka * ka)) * sinc(box * kc) * sinc(box * ka);
 }
 float kept(float edge, float wide, float s) {
   return 1.0 - 2.0 * s / wide * (excess((edge - 0.5 * wide) / s) - excess((edge + 0.5 * wide) / s));
@@ -112,18 +111,17 @@ float kept(float edge, float wide, float s) {
 void main() {
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);
   place_v2 = record(0); v01 = record(2); span = record(3);
-  // Sides of a lattice cell; throughput from, at the anchor, to; points of the lattice, edge, change of W along the sides.
+  // Sides of a lattice cell; throughput from, at the anchor, to; points of the lattice, edge, change of W by the sides.
   vec4 sides = record(1), carried = record(4), origin = record(5);
   float x_lo = max(span.x, support.x), x_hi = min(span.z, support.y);
   if (x_hi <= x_lo) return;
   vec2 to_lo = shift_to(x_lo), to_hi = shift_to(x_hi);
-  // In texels, by the derivatives in the middle; the perspective that these lack is the rasteriser's: a place d texels
-  // away is seen d / (1 + fan · d) away.
+  // In texels, by the derivatives in the middle: a place d texels away is seen d / (1 + fan · d) away.
   vec3 seen = to_texel * vec3(place_v2.xy + 0.5 * (to_lo + to_hi), 1.0);
   if (seen.z <= 0.0) return;
-  vec2 centre = seen.xy / seen.z;
-  mat2 j = mat2(to_texel[0].xy - centre * to_texel[0].z, to_texel[1].xy - centre * to_texel[1].z) / seen.z, back = inverse(j);
-  vec2 fan = vec2(to_texel[0].z, to_texel[1].z) * back / seen.z;
+  centre = seen.xy / seen.z;
+  mat2 j = jacobian(to_texel, seen);
+  vec2 fan = vec2(to_texel[0].z, to_texel[1].z) * inverse(j) / seen.z;
   vec2 chord = j * (to_hi - to_lo), s = j * sides.xy, t = j * sides.zw;
   float cell = cross2(s, t), smoothed = smoothing;
   bool lattice = origin.x > 0.0 && abs(cell) > 1e-6;
@@ -132,34 +130,32 @@ void main() {
     float parted = 2.5 * length(vec2(cross2(chord, t), cross2(s, chord)) / cell) - 0.25;
     smoothed *= mix(NARROWED, 1.0, clamp(max(parted, 4.0 - 4.0 * sqrt(abs(cell))), 0.0, 1.0));
   }
-  vec2 longest = longest_axis(dot(s, s), dot(s, t), dot(t, t));
-  float widens = dot(origin.zw, longest);
-  longest = longest.x * s + longest.y * t;
-  float length2 = dot(longest, longest);
-  if (smoothed * sqrt(length2) > 0.75) fan += widens / length2 * longest;
+  vec2 axis = longest_axis(dot(s, s), dot(s, t), dot(t, t)), longest = mat2(s, t) * axis;
   s *= smoothed; t *= smoothed;
-  // Broad photons go to coarser texels, whose bilinear reading blurs them too; small ones are drawn in parts of a texel.
+  // Broad photons go to coarser texels, whose bilinear reading blurs them too; small ones are drawn in parts of texels.
   vec3 cov = vec3(s.x * s.x + t.x * t.x, s.x * s.y + t.x * t.y, s.y * s.y + t.y * t.y);
   float difference = 0.5 * (cov.x - cov.z), radius = sqrt(difference * difference + cov.y * cov.y);
   vec3 areas = vec3(cross2(s, t), 0.25 * sqrt(TEXEL) * vec2(cross2(s, chord), cross2(t, chord)));
   fine = dot(areas, areas) < 0.09 ? finest : 1.0;
+  if (smoothed * fine * length(longest) > 0.75) fan += dot(origin.zw, axis) / dot(longest, longest) * longest;
   float thin = 0.5 * (cov.x + cov.z) - radius, taken = 0.0, finer = fine;
   int level = 0;
   for (int k = 1; k < LEVELS && fine == 1.0; ++k)
     if (thin * finer * finer > 2.25) { level = k; finer *= 0.5; taken = 0.25 * taken + 11.0 / 48.0; }
-  s *= finer; t *= finer; chord *= finer; centre *= finer; cov *= finer * finer; radius *= finer * finer;
-  difference *= finer * finer; thin *= finer * finer; fan /= finer;
+  s *= finer; t *= finer; chord *= finer; centre *= finer; fan /= finer; cell = cross2(s, t);
+  cov *= finer * finer; radius *= finer * finer; thin *= finer * finer;
   // Along the sweep; or along what is too thin for that, if its sweep leaves it by less than half a texel.
-  vec2 e = longest_axis(cov.x, cov.y, cov.z);
+  e = longest_axis(cov.x, cov.y, cov.z);
   e *= dot(e, chord) < 0.0 ? -1.0 : 1.0;
   float sweep = length(chord), aside = abs(e.x * chord.y - e.y * chord.x), blur = 0.0;
   if (sweep < 1e-4 || (thin < 0.15 && aside < 0.5 && radius > aside * aside * TEXEL)) {
     sweep = dot(e, chord);
     blur = aside * aside * TEXEL;
   } else e = chord / sweep;
-  vec2 m = vec2(-e.y, e.x), sa = vec2(dot(s, e), dot(s, m)), ta = vec2(dot(t, e), dot(t, m));
+  m = vec2(-e.y, e.x);
+  mat2 frame = mat2(e, m);
+  vec2 sa = s * frame, ta = t * frame;
   float a = sa.x * sa.x + ta.x * ta.x, b = sa.x * sa.y + ta.x * ta.y, c = sa.y * sa.y + ta.y * ta.y;
-  cell = cross2(sa, ta);
   float determinant = cell * cell - taken * (a + c - taken);
   a -= taken; c -= taken;
   // Across and along: a box as wide as a texel there, and the rest of the texel as a Gaussian.
@@ -169,26 +165,23 @@ void main() {
   float total = across2 + box * box * TEXEL;
   shear = b / total;
   along2 = max((a * (total - c) + determinant) / total + narrow * narrow * TEXEL, 0.01 + 0.12 * shear * shear);
-  along = e; across = m;
   float sigma = sqrt(along2 + box * box * TEXEL), root = sqrt(across2);
   sweep = max(sweep, 0.03 * sigma);
-  float beside = 0.75 * (fine - 1.0), reach = 0.5 * sweep + 3.0 * sigma + beside, edge = 3.0 * sqrt(total) + beside;
+  float reach = 0.5 * sweep + 3.0 * sigma, edge = 3.0 * sqrt(total);
   vec2 long_side = e * reach, short_side = (m + shear * e) * edge;
-  float amplitude = 1.0 / (box * kept(edge, box, root) * kept(reach, sweep, sigma));
-  // What fans out too far along one axis is not drawn there, and the rest is brighter for it (shaders/lib/fan.glsl there).
-  vec2 corner = corner(), widening = vec2(dot(fan, long_side), dot(fan, short_side));
+  // What fans out too far along one axis is not drawn there, and the rest is brighter for it (shaders/lib/fan.glsl).
+  widening = vec2(dot(fan, long_side), dot(fan, short_side));
   widening *= min(1.0, min(3.0 / max(length(fan) * sqrt(thin + 2.0 * radius), 1e-9),
     0.8 * reach / max(abs(widening.x) * 0.5 * sweep, 1e-9)));
   bool is_along = abs(widening.x) >= abs(widening.y);
-  widening = clamp(widening, is_along ? vec2(-3.0, -0.05) : vec2(-0.05, -3.0), is_along ? vec2(3.0, 0.05) : vec2(0.05, 3.0));
-  vec2 size2 = abs(widening);
+  vec2 most = is_along ? vec2(3.0, 0.05) : vec2(0.05, 3.0), size2 = min(abs(widening), most);
+  widening = clamp(widening, -most, most);
   float end = min((0.85 - min(size2.x, size2.y)) / max(max(size2.x, size2.y), 1e-9), 1.0);
   vec2 ends = is_along ? vec2(end, 1.0) : vec2(1.0, end);
-  if (dot(widening, vec2(is_along, !is_along) * corner) < 0.0) corner *= ends;
-  amplitude *= 2.0 * kept(reach, sweep, sigma) / (kept(reach, sweep, sigma) + kept(ends.x * reach, sweep, sigma));
-  amplitude *= 2.0 * kept(edge, box, root) / (kept(edge, box, root) + kept(ends.y * edge, box, root));
+  float amplitude = 4.0 / box / (kept(reach, sweep, sigma) + kept(ends.x * reach, sweep, sigma))
+    / (kept(edge, box, root) + kept(ends.y * edge, box, root));
   // Splats about a lattice's points add up to 1 and a ripple, which each takes off.
-  ripple = vec3(0.0); at.zw = vec2(0.0); lit = 1.0;
+  ripple = vec3(0.0); cycles = mat2(0.0); lit = vec3(1.0, 0.0, 0.0);
   float swept = sweep * sweep * TEXEL, share = swept / (sigma * sigma + swept);
   mat2 to_spacings = smoothed / cell * mat2(t.y, -t.x, -s.y, s.x);
   if (lattice && abs(cell) > 1e-6) {
@@ -199,60 +192,70 @@ void main() {
       k[i] = to_spacings * steps[i];
       float coarse = max(abs(k[i].x), abs(k[i].y)), ka = TWO_PI * dot(k[i], e);
       float turns2 = smoothed * smoothed * dot(steps[i], steps[i]) - taken * dot(k[i], k[i]);
-      float most = 2.0 * exp(-0.5 * TWO_PI * TWO_PI * max(turns2, 0.0));
-      heights[i] = clamp(damping(k[i], 0.0), 0.0, most) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
+      heights[i] = min(damping(k[i]), 2.0 * exp(-0.5 * TWO_PI * TWO_PI * max(turns2, 0.0)));
+      heights[i] = max(heights[i], 0.0) * clamp(5.0 - 5.0 * coarse, 0.0, 1.0);
       seen[i] = 2.0 * exp(-0.5 * ka * ka * share * sigma * sigma);
     }
     vec3 less = heights - 2.0 * heights.yxx * heights.zzy;
     ripple = less * seen;
     amplitude /= 1.0 - 2.0 * dot(heights, less);
-    at.zw = corner.x * (1.0 - share) * vec2(dot(k[0], long_side), dot(k[1], long_side))
-      + corner.y * vec2(dot(k[0], short_side), dot(k[1], short_side));
+    cycles = transpose(mat2(k[0], k[1])) * mat2((1.0 - share) * long_side, short_side);
   }
   // Where the light's emission ends the splat does, too (shaders/light/splat_lines.glsl there).
   if (origin.y > 0.0 && abs(cell) > 1e-6) {
-    float turn = TWO_PI / 4096.0 * floor(origin.y / 4096.0), inside = (2.0 * mod(origin.y, 4096.0) - 1.0) / 4095.0 - 1.0;
+    float turn = TWO_PI / 4096.0 * floor(origin.y / 4096.0);
+    float inside = (2.0 * mod(origin.y, 4096.0) - 1.0) / 4095.0 - 1.0;
     vec2 within = to_spacings * vec2(cos(turn), sin(turn));
     float ahead = dot(within, e), variance = dot(within, within) * TEXEL + ahead * ahead * share * sigma * sigma;
     if (variance < 0.16) {
       float sharp = sqrt(TEXEL / max(variance, 1e-12));
-      lit = 0.5 + sharp * (inside + (1.0 - share) * corner.x * dot(within, long_side) + corner.y * dot(within, short_side));
+      lit = vec3(0.5, 0.0, 0.0) + sharp * vec3(inside, (1.0 - share) * dot(within, long_side), dot(within, short_side));
       amplitude /= below_normal(inside / 0.42);
     }
   }
-  at.xy = vec2(corner.y * edge * SQRT_HALF / root, 0.5 + corner.x * reach / sweep);
+  spread = vec2(reach / sweep, edge * SQRT_HALF / root);
   band = vec4(x_lo, span.y, x_hi, sqrt(along2) / sweep);
   weights = amplitude * vec3(carried.y, (carried.y - carried.x) / max(span.y - span.x, 1e-6),
     (carried.z - carried.y) / max(span.z - span.y, 1e-6));
   shape = vec4(0.5 * box * SQRT_HALF / root, 0.5 * box / sweep, 1.0 / box, span.w);
   rect = rect_of(level);
-  vec2 away = (corner.x * long_side + corner.y * short_side) / fine;
-  float w = 1.0 + dot(widening, corner);
-  gl_Position = vec4(((rect.xy + centre / fine) * w + away) / vec2(1.5 * float(size.x), size.y) * 2.0 - w, 0.0, w);
+  to_corner = inverse(mat2(long_side, short_side));
+  // A rectangle about all of it, and half a texel more where parts of texels are drawn.
+  vec2 low = vec2(1e9), high = -low, corner = corner();
+  for (int i = 0; i < 4; ++i) {
+    vec2 c = vec2(i & 1, i >> 1) * 2.0 - 1.0;
+    if (dot(widening, vec2(is_along, !is_along) * c) < 0.0) c *= ends;
+    vec2 away = (c.x * long_side + c.y * short_side) * frame / (1.0 + dot(widening, c));
+    low = min(low, away); high = max(high, away);
+  }
+  vec2 at = mix(low, high, 0.5 + 0.5 * corner) + 0.5 * (fine - 1.0) * (abs(e.x) + abs(e.y)) * corner;
+  at = rect.xy + (centre + frame * at) / fine;
+  gl_Position = vec4(at / vec2(1.5 * float(size.x), size.y) * 2.0 - 1.0, 0.0, 1.0);
 }`;
 
-export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + `
-flat in vec4 band, rect, shape;
-flat in vec3 weights, ripple;
-flat in float fine;
-in vec4 at;
-in float lit;
+export const SPLAT_FRAGMENT = COMMON + TABLES + GAUSSIAN + SPLAT("in") + `
 out vec4 deposited;
-float carried_at(float x) { return max(weights.x + min(x - band.y, 0.0) * weights.y + max(x - band.y, 0.0) * weights.z, 0.0); }
+float carried_at(float x) { return max(weights.x + (x - band.y) * (x < band.y ? weights.y : weights.z), 0.0); }
 float share_of(float away, float half_texel, float scale) {
-  return 0.5 * (error_function(min((away + half_texel) * scale, 6.0)) - error_function(max((away - half_texel) * scale, -6.0)));
+  vec2 ends = clamp(vec2(away - half_texel, away + half_texel) * scale, -6.0, 6.0);
+  return 0.5 * (error_function(ends.y) - error_function(ends.x));
 }
 // What a texel gets, or a part of one, whose middle is there.
-vec3 light_at(vec4 at) {
-  vec3 away = abs(fract(vec3(at.zw, at.z + at.w)) * 2.0 - 1.0);
-  float w = 1.0 / gl_FragCoord.w, share = w * w * share_of(at.x, w * shape.x, 1.0);
+vec3 light_at(vec2 place) {
+  vec2 c = to_corner * (place - centre);
+  float w = 1.0 / (1.0 - dot(widening, c));
+  c *= w;
+  if (w < 0.149 || any(greaterThan(abs(c), vec2(1.0)))) return vec3(0.0);
+  vec2 at = vec2(0.0, 0.5) + spread.yx * c.yx, turns = cycles * c;
+  vec3 away = abs(fract(vec3(turns, turns.x + turns.y)) * 2.0 - 1.0);
+  float share = w * w * share_of(at.x, w * shape.x, 1.0) * clamp(dot(lit, vec3(1.0, c)), 0.0, 1.0);
   share *= 1.0 - dot(ripple, 2.0 * away * away * (3.0 - 2.0 * away) - 1.0);
   // What lands within three standard deviations of the texel, in parts: their light times the share of what is spread
   // about their middles that the texel gets along the sweep.
   float s = band.w, reach = shape.y + 3.0 * s, from = clamp(at.y - reach, 0.0, 1.0), to = clamp(at.y + reach, 0.0, 1.0);
   int row = int(shape.w), parts = clamp(int(ceil(1.3 * (to - from) / s)), 3, 8);
-  float step_way = (to - from) / float(parts), own = SQRT_HALF / sqrt(max(s * s - step_way * step_way / 12.0, 0.25 * s * s));
-  float x_from = mix(band.x, band.z, from);
+  float step_way = (to - from) / float(parts), x_from = mix(band.x, band.z, from);
+  float own = SQRT_HALF / sqrt(max(s * s - step_way * step_way / 12.0, 0.25 * s * s));
   vec3 sum = vec3(0.0), before = energy_below(row, x_from);
   for (int i = 1; i <= parts; ++i) {
     float way = from + float(i) * step_way, x = mix(band.x, band.z, way);
@@ -264,19 +267,16 @@ vec3 light_at(vec4 at) {
   for (int k = 0; k < lines; ++k) {
     vec4 line = line_of(row, k);
     if (line.w < band.x || line.w >= band.z) continue;
-    sum += line.rgb * share_of((line.w - band.x) / (band.z - band.x) - at.y, shape.y, SQRT_HALF / s) * carried_at(line.w);
+    float way = (line.w - band.x) / (band.z - band.x);
+    sum += line.rgb * share_of(way - at.y, shape.y, SQRT_HALF / s) * carried_at(line.w);
   }
   return shape.z * share * sum;
 }
 void main() {
-  vec4 right = dFdx(at), up = dFdy(at);
-  vec3 lits = vec3(lit, dFdx(lit), dFdy(lit));
   if (any(lessThan(gl_FragCoord.xy, rect.xy)) || any(greaterThanEqual(gl_FragCoord.xy, rect.zw))) discard;
   vec3 sum = vec3(0.0);
-  for (int i = 0; i < int(fine * fine); ++i) {
-    vec2 beside = (vec2(i % int(fine), i / int(fine)) + 0.5) / fine - 0.5;
-    sum += clamp(dot(lits, vec3(1.0, beside)), 0.0, 1.0) * light_at(at + beside.x * right + beside.y * up);
-  }
+  for (int i = 0; i < int(fine * fine); ++i)
+    sum += light_at((gl_FragCoord.xy - 0.5 - rect.xy) * fine + vec2(i % int(fine), i / int(fine)) + 0.5);
   deposited = vec4(sum, 0.0);
 }`;
 
@@ -296,9 +296,7 @@ void main() {
   vec2 right = e * reach, up = vec2(-e.y, e.x) * more.x;
   vec3 seen = to_texel * vec3(quad.xy + corner.x * right + corner.y * up, 1.0);
   // A texel farther out, as the sides go there.
-  vec2 at = seen.xy / seen.z;
-  vec2 along = (to_texel * vec3(right, 0.0)).xy - at * dot(vec2(to_texel[0].z, to_texel[1].z), right),
-       across = (to_texel * vec3(up, 0.0)).xy - at * dot(vec2(to_texel[0].z, to_texel[1].z), up);
+  vec2 along = jacobian(to_texel, seen) * right, across = jacobian(to_texel, seen) * up;
   if (length(along) < 1e-6 * length(across)) along = vec2(across.y, -across.x);
   if (length(across) < 1e-6 * length(along)) across = vec2(-along.y, along.x);
   along = normalize(along);
@@ -330,8 +328,8 @@ vec4 seen_line(vec4 line) {
   float per = inversesqrt(max(dot(n, n), 1e-30)), soft = max(line.w, 0.0) * length(line.xy) * per;
   return vec4(n, dot(line.xy, place) + line.z, sqrt(1.0 + 4.0 * soft * soft));
 }
-// Part of the texel within all edges at t: what borders it, by lengths times distances (shaders/light/beam_coverage.glsl
-// of the desktop program).
+// Part of the texel within all edges at t: what borders it, by lengths times distances
+// (shaders/light/beam_coverage.glsl there).
 vec3 line_at(int e, float t) {
   vec4 line = seen_line(edge_texel(2 * e) + t * edge_texel(2 * e + 1));
   float per = inversesqrt(max(dot(line.xy, line.xy), 1e-30));
@@ -384,13 +382,14 @@ vec2 positive(float start, float change) {
   float end = start + change, t = start / (start - end);
   return vec2(start > 0.0 ? 0.0 : end > 0.0 ? t : 2.0, end > 0.0 ? 1.0 : start > 0.0 ? t : -1.0);
 }
+float density_at(float t) { return parabola.x + t * (parabola.y + t * parabola.z); }
 vec3 sum = vec3(0.0);
 void add(vec2 interval, int parts, bool whole) {
   vec3 before = energy_below(list.z, mix(band.x, band.y, interval.x));
   for (int i = 0; i < parts; ++i) {
-    float to = mix(interval.x, interval.y, float(i + 1) / float(parts)), t = to - 0.5 * (interval.y - interval.x) / float(parts);
-    vec3 now = energy_below(list.z, mix(band.x, band.y, to));
-    sum += (whole ? 1.0 : covered(t)) * (parabola.x + t * (parabola.y + t * parabola.z)) * (now - before);
+    vec2 part = mix(interval.xx, interval.yy, (vec2(i) + vec2(0.5, 1.0)) / float(parts));
+    vec3 now = energy_below(list.z, mix(band.x, band.y, part.y));
+    sum += (whole ? 1.0 : covered(part.x)) * density_at(part.x) * (now - before);
     before = now;
   }
 }
@@ -401,14 +400,15 @@ void main() {
   if (uvw.z <= 0.0) discard;
   vec2 uv = uvw.xy / uvw.z;
   place = uv - about;
-  sides = mat2(to_uv[0].xy - uv * to_uv[0].z, to_uv[1].xy - uv * to_uv[1].z) / uvw.z;
+  sides = jacobian(to_uv, uvw);
   float wide = band.y - band.x;
-  vec2 lit = wide > 0.0 ? (clamp(support, band.xx, band.yy) - band.x) / wide : vec2(0.0, 1.0), touched = lit, whole = lit;
+  vec2 lit = wide > 0.0 ? (clamp(support, band.x, band.y) - band.x) / wide : vec2(0.0, 1.0), touched = lit, whole = lit;
   // Parts of the band: three of what is lit where the density changes, or sixteenths of a texel that edges move.
   bool is_even = abs(parabola.y) + abs(parabola.z) < 0.005 * parabola.x;
   float moves = is_even ? 0.0 : 3.0 / max(lit.y - lit.x, 1e-6);
   for (int i = 0; i < list.y; ++i) {
-    vec4 start = edge_texel(2 * (list.x + i)), from = seen_line(start), to = seen_line(start + edge_texel(2 * (list.x + i) + 1));
+    int e = 2 * (list.x + i);
+    vec4 start = edge_texel(e), from = seen_line(start), to = seen_line(start + edge_texel(e + 1));
     float h = from.z, dh = to.z - h, r = 0.5 * (abs(from.x) + abs(from.y)) * from.w;
     float dr = 0.5 * (abs(to.x) + abs(to.y)) * to.w - r;
     vec2 touches = positive(h + r, dh + dr), covers = positive(h - r, dh - dr);
@@ -419,14 +419,15 @@ void main() {
   if (touched.x > touched.y) discard;
   if (whole.x < whole.y) {
     add(whole, 3, true);
-    if (whole.x > touched.x) add(vec2(touched.x, whole.x), clamp(int(ceil(moves * (whole.x - touched.x))), 1, 4), false);
-    if (whole.y < touched.y) add(vec2(whole.y, touched.y), clamp(int(ceil(moves * (touched.y - whole.y))), 1, 4), false);
+    ivec2 parts = clamp(ivec2(ceil(moves * abs(whole - touched))), 1, 4);
+    if (whole.x > touched.x) add(vec2(touched.x, whole.x), parts.x, false);
+    if (whole.y < touched.y) add(vec2(whole.y, touched.y), parts.y, false);
   } else add(touched, clamp(int(ceil(moves * (touched.y - touched.x))), 1, 8), false);
   for (int k = 0; k < lines; ++k) {
     vec4 line = line_of(list.z, k);
     if (line.w < band.x || line.w >= band.y) continue;
     float t = (line.w - band.x) / wide;
-    if (t >= touched.x && t <= touched.y) sum += covered(t) * (parabola.x + t * (parabola.y + t * parabola.z)) * line.rgb;
+    if (t >= touched.x && t <= touched.y) sum += covered(t) * density_at(t) * line.rgb;
   }
   deposited = vec4(max(1.0 + dot(tilt.xy, uv - tilt.zw), 0.0) * texel_area(texel) * sum, 0.0);
 }`;
@@ -455,7 +456,8 @@ vec3 bilinear(int level, vec2 place) {
 }
 vec3 irradiance(vec2 texel) {
   vec3 sum = vec3(0.0);
-  for (int level = 0; level < LEVELS; ++level) sum += bilinear(level, texel * exp2(float(-level))) * exp2(float(-2 * level));
+  for (int level = 0; level < LEVELS; ++level)
+    sum += bilinear(level, texel * exp2(float(-level))) * exp2(float(-2 * level));
   return sum / texel_area(texel);
 }
 float fifth_powers(vec3 c) { vec3 q = c * c; return dot(q * q, c); }

@@ -51,8 +51,7 @@ export function lightTable(rows, x, response) {
     for (const [nm] of lines) ends.push(valueAt(x, nm) - 2e-4, valueAt(x, nm) + 2e-4);
   }
   const low = Math.min(1, ...ends), high = Math.max(0, ...ends);
-  const middle = (low + high) / 2, half = Math.max((high - low) / 2, 2e-4);
-  const support = [middle - half, middle + half];
+  const middle = (low + high) / 2, half = Math.max((high - low) / 2, 2e-4), support = [middle - half, middle + half];
   const lineCount = Math.max(...rows.map(({ lines }) => lines.length));
   const width = SAMPLES + lineCount, table = new Float32Array(4 * width * rows.length);
   rows.forEach((spectrum, r) => {

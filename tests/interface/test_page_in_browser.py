@@ -28,12 +28,12 @@ def browser() -> Iterator[Browser]:
         yield one
 
 
-def shown_map(browser: Browser, thin: int = 1) -> np.ndarray:
+def shown_map(browser: Browser, thin: int = 1, texels: int = TEXELS) -> np.ndarray:
     """Irradiance (rows, columns, 3), v upwards along rows, seen from above, by one photon in `thin`."""
     browser.run("spectrasplat.frame()")
-    step = 2.0 / TEXELS
+    step = 2.0 / texels
     to_uv = np.array([[step, 0.0, -1.0], [0.0, -step, 1.0], [0.0, 0.0, 1.0]])
-    return gathered(browser, to_uv, TEXELS, TEXELS, thin)[::-1]
+    return gathered(browser, to_uv, texels, texels, thin)[::-1]
 
 
 def test_it_opens_from_a_file_and_asks_for_nothing(browser: Browser, tmp_path: Path) -> None:
@@ -66,6 +66,14 @@ def test_photons_are_what_they_integrate_to(
     found, right = shown_map(browser), photon_map(things, gain, lines)
     assert difference(found, right) < bound
     np.testing.assert_allclose(found.sum(axis=(0, 1)), right.sum(axis=(0, 1)), rtol=0.01)
+
+
+def test_small_photons_are_the_same_in_larger_pixels(browser: Browser, tmp_path: Path) -> None:
+    """They widen along their sides, also where they are smaller than a pixel."""
+    things = RISING | {"photons.fan": np.tile([0.5, -0.3], (3, 1)).astype("f2")}
+    browser.open(written(tmp_path, things))
+    large, small = shown_map(browser, texels=TEXELS // 4), shown_map(browser)
+    assert difference(large, small.reshape(TEXELS // 4, 4, TEXELS // 4, 4, 3).mean(axis=(1, 3))) < 0.01
 
 
 @pytest.mark.parametrize(("half", "moves", "turns"), [((0.1, 0.3), [0.7, 0.5], 0.4), ((0.006, 0.3), [0.7, 0.5], 0.0)])
