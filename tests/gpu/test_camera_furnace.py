@@ -160,7 +160,7 @@ def checkered(cells: int, texels: int = 512) -> SceneObject:
     return SceneObject("paper", mesh, Diffuse((1, 1, 1), texture=Texture(np.repeat(grey[..., None], 3, axis=2))))
 
 
-@pytest.mark.parametrize("solid", ["none", "slab", "ball"])
+@pytest.mark.parametrize("solid", ["none", pytest.param("slab", marks=pytest.mark.slow), "ball"])
 def test_a_checker_finer_than_pixels_is_grey_through_glass(gl, solid: str) -> None:
     """Cells of an eighth of a pixel: one sample a pixel shows their mean to 2 %; a texture looked up without its
     footprint shows black or white."""

@@ -131,7 +131,7 @@ def test_a_stop_while_tracing_still_gives_a_picture(gl: Context) -> None:
     assert [share for share, _ in told] == sorted(share for share, _ in told)
 
 
-@pytest.mark.parametrize("name", ["prism", "brilliant"])
+@pytest.mark.parametrize("name", ["prism", pytest.param("brilliant", marks=pytest.mark.slow)])
 def test_a_stop_before_the_first_camera_sample_waits_for_it(gl: Context, name: str) -> None:
     """While a survey looks at the picture and while beams are drawn no pixel has a sample: what was written was
     black."""

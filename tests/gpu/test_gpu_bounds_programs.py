@@ -28,7 +28,10 @@ _held: set[tuple[str, ...]] = set()
 """Texts that were looked at."""
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["drawn splats", "added splats"])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param(False, id="drawn splats", marks=pytest.mark.slow), pytest.param(True, id="added splats")],
+)
 def device(request: pytest.FixtureRequest) -> Iterator[Context]:
     with assumed(DeviceTraits(splats_by_compute=request.param)), create_context() as context:
         shader.keep_programs(context.ctx)

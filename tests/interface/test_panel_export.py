@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit import requests
-from spectrasplat.edit.state import Compare, Key, State
+from spectrasplat.edit.state import Key, State
 from spectrasplat.ui.panels import export_panel, file_browser
 from spectrasplat.ui.panels.compare_panel import draw_compare
 from spectrasplat.ui.panels.export_panel import draw_export
@@ -149,19 +149,3 @@ def test_comparing(gl) -> None:
         assert rig.state.requests == (requests.ComputeReference(),)
         choose(rig, "Show", "Error map")
         assert "Scale" in rig.items.items and "Line at" not in rig.items.items
-
-
-def test_a_picture_file_has_no_progress(gl) -> None:
-    """It is read at once; there is nothing to start again."""
-    state = replace(scene_state(), compare=Compare(mode="wipe", method="file"))
-    with PanelRig(gl, draw_compare, state, (900, 320)) as rig:
-        rig.frame(2)
-        assert "File" in rig.items.items
-        assert not {"Progress", "Start again"} & rig.items.items.keys()
-
-
-def test_values_stand_within_a_wide_panel(gl) -> None:
-    with PanelRig(gl, draw_compare, replace(scene_state(), compare=Compare(mode="wipe")), (900, 320)) as rig:
-        rig.frame(2)
-        assert rig.find("Show").right < rig.find("Here").left < rig.find("Here").right < 900
-        assert rig.find("Here").bottom < rig.find("Progress").bottom < 320  # nothing to scroll to

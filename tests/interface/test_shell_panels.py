@@ -162,19 +162,6 @@ def test_solo_strip_picks_and_sweep_runs_until_touched(rig: ShellRig) -> None:
     assert rig.state.solo_nm == still == pytest.approx(480.0, abs=3.0)
 
 
-def test_history_click_goes_there(rig: ShellRig) -> None:
-    rig.open_panel(history=True)
-    rig.click("Step 0")
-    assert rig.asked[-1] == requests.GoTo(0)
-
-
-def test_retrace_button_and_job_cancel(rig: ShellRig) -> None:
-    rig.click("Retrace")
-    assert rig.asked[-1] == requests.Retrace()
-    rig.click("Cancel")
-    assert rig.asked[-1] == requests.CancelJob()
-
-
 def test_start_page_opens_a_card_and_closes(rig: ShellRig) -> None:
     rig.open_panel(start_page=True)
     rig.click("lens")
@@ -188,11 +175,6 @@ def test_start_page_hides_no_edits_and_closes_by_esc(rig: ShellRig) -> None:
     assert len(rig.state.scene.objects) == 2 and not rig.asked
     rig.key(imgui.Key.escape)
     assert not rig.state.preferences.panels.start_page
-
-
-def test_status_bar_pauses(rig: ShellRig) -> None:
-    rig.click("Play or pause")
-    assert not rig.state.playing
 
 
 def test_start_page_offers_the_recovery(rig: ShellRig) -> None:
