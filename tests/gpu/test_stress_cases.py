@@ -31,7 +31,6 @@ from spectrasplat.stress.cases import (
 )
 from spectrasplat.stress.cases import optics as optics_cases
 from spectrasplat.stress.rigs import flat_glass
-from spectrasplat.stress.rigs.camera_probe import daylight_mean, fresnel, sky
 from spectrasplat.stress.rigs.gpu_paths import beam_light, glass, placed, screen, trace_light
 from spectrasplat.stress.runner import cases_of
 
@@ -311,39 +310,3 @@ def test_ways_through_flat_glass_add_up() -> None:
     assert through == pytest.approx(contacts.plates(1.5), abs=1e-4)
     slanting = flat_glass.ways(slab, 1.5, (0.0, 1.0), (0.6, -0.8))
     assert np.allclose(max(slanting, key=lambda way: way.weight).direction, (0.6, -0.8, 0.0), atol=1e-12)
-
-
-def test_ways_split_where_total_reflection_sets_in() -> None:
-    critical = np.arcsin(1.0 / 1.5)
-    for side in (-1.0, 1.0):
-        out = flat_glass.ways(flat_glass.trapezium(critical + side * 1e-3), 1.5, (-1.0, 0.0), (1.0, 0.0))
-        direct = [way for way in out if way.events == 2 and way.direction[0] > 0.0]
-        assert len(direct) == (1 if side < 0.0 else 0)
-
-
-def test_a_ray_past_a_polygon_meets_nothing() -> None:
-    square = flat_glass.rectangle(1.0, 1.0)
-    for start, direction in (
-        ((-2.0, 0.7), (1.0, 0.0)),
-        ((2.0, 0.0), (1.0, 0.0)),
-        ((-2.0, -1.0), (np.sqrt(0.5), -np.sqrt(0.5))),
-    ):
-        (only,) = flat_glass.ways(square, 1.5, start, direction)
-        assert only.weight == 1.0 and only.events == 0
-
-
-def test_fresnel_and_daylight_are_those_of_the_books() -> None:
-    """N-BK7 at 0, 45 and 75 degrees; a white that all arrives is white."""
-    assert fresnel(np.cos(np.radians([0.0, 45.0, 75.0])), 1.5168) == pytest.approx(
-        [0.042165, 0.052595, 0.256144], abs=1e-6
-    )
-    assert fresnel(0.5, 1.0 / 1.5168) == 1.0
-    assert daylight_mean(np.ones(401)) == pytest.approx(np.ones(3), abs=1e-4)
-
-
-def test_a_sky_is_where_it_is_said_to_be() -> None:
-    """Straight up is the first row; the picture's middle column lies towards x."""
-    rgb = sky(lambda d: d[..., 2] + 2.0, height=64).rgb
-    assert rgb[0, 0, 0] == pytest.approx(3.0, abs=1e-3) and rgb[-1, 0, 0] == pytest.approx(1.0, abs=1e-3)
-    ahead = sky(lambda d: d[..., 0] + 2.0, height=64).rgb
-    assert np.unravel_index(ahead[..., 0].argmax(), ahead.shape[:2])[1] in (63, 64)

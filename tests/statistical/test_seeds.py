@@ -73,18 +73,6 @@ def test_words_of_small_numbers_are_uniform_and_independent_of_their_neighbours(
     assert even((summed[1:] - summed[:-1]) % 1.0) < 1e-3 * ALPHA
 
 
-def test_order_of_the_numbers_counts() -> None:
-    assert (
-        len(
-            {
-                random_word(*at)
-                for at in ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1), (0, 0, 0, 0), (2**32 - 1, 0, 0, 0))
-            }
-        )
-        == 6
-    )
-
-
 def test_passes_of_one_seed_keep_their_sequence() -> None:
     """What is random is where it starts: from pass to pass every shift moves by its own irrational."""
     for dimension, generator in PASS_GENERATORS.items():

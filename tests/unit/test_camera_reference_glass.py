@@ -15,12 +15,12 @@ from reference import camera_answers
 from spectrasplat.base.errors import UserError
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.primitives_round import sphere
-from spectrasplat.model.lights import AreaLight, CollimatedLight, DirectionalLight, PointLight, SpotLight
+from spectrasplat.model.lights import AreaLight, CollimatedLight, PointLight
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.model.optics.glass import Dispersion
 from spectrasplat.model.optics.glass import constant as constant_index
 from spectrasplat.model.optics.spectrum import Spectrum, laser
-from spectrasplat.model.scene import Absorption, Camera, Dielectric, Diffuse, Mirror, Scene, SceneObject
+from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
 from spectrasplat.model.texture import Texture
 from spectrasplat.reference import photon_reference
 from spectrasplat.reference.camera_reference import CameraRun, render_camera_reference
@@ -149,40 +149,6 @@ def test_the_caustic_is_that_of_the_light_reference() -> None:
     assert blocks[1].max() > 0.1
     np.testing.assert_allclose(blocks[0], blocks[1], atol=0.03 * blocks[1].max())
     np.testing.assert_allclose(blocks[0].sum(axis=(0, 1)), blocks[1].sum(axis=(0, 1)), rtol=4e-3)
-
-
-def busy_scene() -> Scene:
-    """A smooth tinted ball with a bubble of other glass in it, a block that touches it, a mirror, over a plate of
-    spectral reflectance."""
-    tint = Absorption(np.linspace(0.3, 0.0, 401))
-    lights = (
-        DirectionalLight("sun", D65, direction=(0.3, 0.2, -1.0), angular_diameter_deg=3.0),
-        SpotLight("spot", laser(600.0, 0.02), (0.5, -1.0, 4.0), outer_half_angle_deg=30.0),
-    )
-    return scene_of(
-        *lights,
-        place(sphere(0.5, 1280), Dielectric(FLINT, tint, 1), (0.0, 0.0, 0.6)),
-        place(sphere(0.2, 320), Dielectric(constant_index(1.33), None, 2), (0.1, 0.0, 0.7)),
-        place(primitives.box((0.6, 0.6, 0.6)), Dielectric(constant_index(1.6), None, 0), (0.5, 0.0, 0.5)),
-        place(sphere(0.2, 320), Mirror((1.0, 1.0, 1.0)), (-0.7, 0.3, 0.4)),
-        plate(Diffuse(reflectance=np.linspace(0.9, 0.3, 401)), 8.0),
-        camera=Camera((0.0, -5.0, 4.0), (0.0, 0.3, 0.0), vertical_fov_deg=40.0),
-    )
-
-
-@pytest.mark.slow
-def test_nested_and_smooth_glass_throws_the_light_references_light() -> None:
-    """Both tracers' loops are written apart. Sums over what is seen directly agree to 2 %, blocks to 8 % of the
-    brightest (a focus of few texels)."""
-    scene = busy_scene()
-    caustic = build_caustic(scene, 36, 24, replace(PLAN, photons=1 << 18, texel_size=0.02))
-    lit, dark = (render_camera_reference(scene, 36, 24, samples=256, caustic=c).xyz for c in (caustic, None))
-    seen = seen_directly(scene, 36, 24)[..., None]
-    light = render_reference(scene, 36, 24, photons=1 << 19).xyz * seen
-    mine = (lit - dark) * seen
-    np.testing.assert_allclose(mine.sum(axis=(0, 1)), light.sum(axis=(0, 1)), rtol=0.02)
-    blocks = [p.reshape(6, 4, 9, 4, 3).mean(axis=(1, 3)) for p in (mine, light)]
-    np.testing.assert_allclose(blocks[0], blocks[1], atol=0.08 * blocks[1].max())
 
 
 def test_a_caustic_behind_a_pane_of_air_is_the_same() -> None:

@@ -14,7 +14,7 @@ import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.base.interrupts import Interruption, Terminated, exit_code_of, interrupt_flag, signals_raise
 
-from tests.fuzz.kills import SCENE, kill_one
+from tests.fuzz.kills import SCENE
 
 TINY = ["render", "scene.toml", "-o", "out.npy", "--size", "16x9", "--photons", "1k", "--spp", "1"]
 
@@ -77,16 +77,6 @@ def test_what_nohup_ignores_stays_ignored() -> None:
             assert not interrupted()
     finally:
         signal.signal(signal.SIGHUP, before)
-
-
-@pytest.mark.slow
-def test_some_kills_at_any_moment(tmp_path: Path) -> None:
-    rng = np.random.default_rng(4)
-    for index in range(4):
-        folder = tmp_path / str(index)
-        folder.mkdir()
-        kill = kill_one(rng, folder)
-        assert not kill.faults, str(kill)
 
 
 @pytest.mark.parametrize(
