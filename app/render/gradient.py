@@ -31,9 +31,9 @@ _CHANGE, _LEAST_CHANGE, _MOST_CHANGE = 0.03, 0.01, 0.08
 derivative."""
 _LARGEST, _TRIES, _TRIED = 8.0, 3, 1 << 15
 """A step over the first one at most; pictures by so many photons until it is found."""
-_BANDS, _PHOTONS_A_BAND = 16, 1 << 13
-"""Spectral bands: within one, footprints are as broad as at its middle. That misses little of a picture, and much of
-what dispersion changes in a focus."""
+ENOUGH, _BANDS = 1 << 17, 16
+"""Photons, and their spectral bands, of which fewer have fewer: within one, footprints are as broad as at its middle.
+That misses little of a picture, and much of what dispersion changes in a focus."""
 _OTHER_SEED = 1 << 31
 """Of the quarter of the photons, over that of all."""
 _WORSE, _WORSE_SEEN = 3.0, 5.0**0.5
@@ -80,8 +80,8 @@ def gradient(
     for path in paths:
         check_path(stage, path)
     photons = settings.photons or stage.scene.render.photons
-    few = _with_bands(replace(settings, photons=min(photons, _TRIED), seconds=None, spp=1))
-    runs = [_with_bands(replace(settings, photons=photons))]
+    few = with_bands(replace(settings, photons=min(photons, _TRIED), seconds=None, spp=1))
+    runs = [with_bands(replace(settings, photons=photons))]
     if noise:
         spp, seed = max(1, CameraSampling.of(settings).budget // 4), (settings.seed + _OTHER_SEED) & 0xFFFFFFFF
         runs.append(replace(runs[0], photons=max(1, photons // 4), spp=spp, seed=seed))
@@ -109,9 +109,10 @@ def gradient(
     return Gradient(base, tuple(derivatives), where or None)
 
 
-def _with_bands(settings: RenderSettings) -> RenderSettings:
+def with_bands(settings: RenderSettings) -> RenderSettings:
+    """`settings` of what is differentiated, or compared with that."""
     assert settings.photons is not None
-    return replace(settings, least_bands=int(np.clip(settings.photons // _PHOTONS_A_BAND, 1, _BANDS)))
+    return replace(settings, least_bands=int(np.clip(settings.photons * _BANDS // ENOUGH, 1, _BANDS)))
 
 
 def _difference(low: Picture, high: Picture, h: float) -> Picture:

@@ -19,6 +19,7 @@ from ..model.settings import RenderSettings
 from ..model.vectors import Vec3
 from ..passes.plane_frame import plane_frame
 from .bake import drawn
+from .gradient import with_bands
 
 BINS = 16
 """Of maps that are compared in colour only."""
@@ -69,7 +70,7 @@ class Target:
         """Of the maps."""
         size = np.ptp(self.window @ self.axes.T, axis=0)
         width, height = np.maximum(np.round(_TEXELS * size / size.max()), _FEWEST).astype(int)
-        return replace(
+        its = replace(
             settings,
             layer=f"map:{self.receiver}",
             bins=self.bins,
@@ -77,6 +78,7 @@ class Target:
             height=int(height),
             exposure_ev=None,
         )
+        return with_bands(its)
 
     def seen(self, spectral: np.ndarray, placement: object) -> np.ndarray:
         """Means over the target's cells (h, w, bins) of a map (H, W, bins) of such a placement."""

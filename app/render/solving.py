@@ -28,7 +28,7 @@ from ..model.settings import RenderSettings
 from ..passes.picture_channels import Channels
 from .bake import drawn
 from .frames import Picture
-from .gradient import INDEX, Gradient, gradient, nudged
+from .gradient import ENOUGH, INDEX, Gradient, gradient, nudged
 from .light_target import Target, wanted
 
 T = TypeVar("T")
@@ -36,8 +36,6 @@ _PARTS, _INDICES, _TRIED = 3, 32, 1 << 15
 """Pictures that show the light of all indices, how many indices each, and photons of them."""
 _NEAR, _HARDLY = 0.3, 0.95
 """What the blurred light of the scene's own glass, and of another one, may differ by to begin with it."""
-_TESTED = 20
-"""Glasses that are rendered at the end, next to the nearest."""
 _ALIKE = 0.01
 """The same of a width, which glasses of any n_d may have."""
 _BLURS = (0.12, 0.04, 0.0)
@@ -116,10 +114,9 @@ class Solver:
         says nothing."""
         entries = [e for e in catalogue.entries() if e.dispersion.is_dispersive and self._may_be(index, e.dispersion)]
         curves = np.stack([_at_bins(entry.dispersion, self._edges) for entry in entries])
-        start = yield from self._nearest(index, entries, curves)
+        best = yield from self._nearest(index, entries, curves)
         known: dict[int, Gradient] = {}
         names = [entry.qualified_name for entry in entries]
-        best, errors, columns = start, np.zeros(0), np.zeros((0, 0))
 
         def derived(number: int) -> Generator[float, None, Gradient]:
             if number not in known:
@@ -128,20 +125,15 @@ class Solver:
                 known[number] = yield from part_of(steps, min(0.42 + 0.05 * len(known), 0.8), 0.05)
             return known[number]
 
+        self._check(self._by_bin((yield from derived(best)), self._blurs[0]), entries[best].dispersion)
         for blur in self._blurs:
             seen: set[int] = set()
             while best not in seen and len(seen) < _STEPS:
                 seen.add(best)
                 columns = self._by_bin((yield from derived(best)), blur)
-                if not errors.size:
-                    self._check(columns, entries[best].dispersion)
-                errors = self._errors(columns, self._wanted(blur), curves - curves[best])
-                last, best = best, int(np.argmin(errors))
-            best = last if len(seen) == _STEPS else best
-        tried = _neighbours(known[best], curves - curves[best])
-        errors[tried] = yield from part_of(self._lit(index, [entries[i] for i in tried], 0.0), 0.85, 0.1)
-        if (best := int(np.argmin(errors))) not in known:
-            columns = self._by_bin((yield from derived(best)), 0.0)
+                best = int(np.argmin(self._errors(columns, self._wanted(blur), curves - curves[best])))
+        columns = self._by_bin((yield from derived(best)), 0.0)
+        errors = self._errors(columns, self._wanted(0.0), curves - curves[best])
         self._check_ends(columns)
         if not errors.min() < _HARDLY:
             raise UserError(
@@ -168,8 +160,11 @@ class Solver:
         """The glass to begin with: the scene's own where its light is near, or else the one whose light is foreseen to
         be nearest. Raises `UserError` where none lights the target."""
         own = _at_bins(self.stage.scene.objects[index].material.dispersion, self._edges)
-        nearest = int(np.abs(curves - own).max(axis=1).argmin())
-        (error,) = yield from part_of(self._lit(index, [entries[nearest]], _BLURS[0]), 0.0, 0.05)
+        nearest, blur = int(np.abs(curves - own).max(axis=1).argmin()), self._blurs[0]
+        stage = replace(self.stage, scene=set_dispersion(self.stage.scene, index, entries[nearest].dispersion))
+        found = yield from part_of(drawn(self.context, self._few, [stage], self.target.window), 0.0, 0.05)
+        shown = self._colours(found.pictures[0], found.placement, blur).reshape(-1, 1)
+        (error,) = self._errors(shown, self._wanted(blur), np.zeros((1, 0)))
         if error < (_NEAR if self.target.width is None else _ALIKE):
             return nearest
         errors = yield from part_of(self._foreseen(index, curves), 0.05, 0.35)
@@ -184,56 +179,39 @@ class Solver:
         colours, every bin of a spectrum is the light of one index."""
         from scipy.interpolate import interp1d
 
-        scene, cells = _without_colours(self.stage.scene, index), []
-        edges = np.quantile(curves, np.linspace(0.0, 1.0, _PARTS * _INDICES + 1)) + 1e-9 * np.arange(
-            _PARTS * _INDICES + 1
-        )
+        plain, cells = _without_colours(self.stage.scene, index), []
+        edges = np.quantile(curves, np.linspace(0.0, 1.0, _PARTS * _INDICES + 1))
+        edges += 1e-9 * np.arange(len(edges))  # no two alike
         settings = replace(self._few, bins=_INDICES)
         for part in range(_PARTS):
             rising = edges[part * _INDICES :][: _INDICES + 1]
             swept = glass.table(np.linspace(380.0, 780.0, _INDICES + 1), rising[::-1].tolist(), "swept")
-            stage = replace(self.stage, scene=set_dispersion(scene, index, swept))
+            stage = replace(self.stage, scene=set_dispersion(plain, index, swept))
             steps = drawn(self.context, settings, [stage], self.target.window)
             found = yield from part_of(steps, part / _PARTS, 1.0 / _PARTS)
             assert found.pictures[0].spectral is not None
             cells.append(self.target.seen(found.pictures[0].spectral, found.placement)[..., ::-1])
-        blur = _BLURS[0] if self.target.width is None else 0.0
+        blur = self._blurs[0]
         thin = slice(None, None, max(1, int(0.5 * blur * max(self.target.values.shape))))
         light = _blurred(np.concatenate(cells, axis=-1), blur)[thin, thin]
-        of_index = interp1d(
-            0.5 * (edges[1:] + edges[:-1]), light, bounds_error=False, fill_value=(light[..., 0], light[..., -1])
-        )
-        lamps = sum(lamp.spectral_power.binned(self._edges) for lamp in self.stage.scene.lights)
+        ends = light[..., 0], light[..., -1]
+        of_index = interp1d(0.5 * (edges[1:] + edges[:-1]), light, bounds_error=False, fill_value=ends)
+        lamps = self.stage.scene.lights
+        power = sum(lamp.spectral_power.binned(self._edges) for lamp in lamps) if lamps else 1.0
         wanted = _blurred(self.target.values.astype(float), blur)[thin, thin].ravel()
         errors = []
         for curve in curves:
-            shown = self._in_channels(of_index(curve) * lamps).reshape(-1, 1)
+            shown = self._in_channels(of_index(curve) * power).reshape(-1, 1)
             errors.append(self._errors(shown, wanted, np.zeros((1, 0)))[0])
         return np.array(errors)
 
-    def _lit(self, index: int, entries: Sequence[catalogue.Entry], blur: float) -> Generator[float, None, list[float]]:
-        """What the light of each glass, blurred of few photons, differs by from the target."""
-        settings, errors = self._few if blur else self._settings, []
-        blur = blur if self.target.width is None else 0.0
-        for number, entry in enumerate(entries):
-            stage = replace(self.stage, scene=set_dispersion(self.stage.scene, index, entry.dispersion))
-            # A renderer each: the spectral axis of several is coarse where some do not disperse.
-            steps = drawn(self.context, settings, [stage], self.target.window)
-            found = yield from part_of(steps, number / len(entries), 1.0 / len(entries))
-            shown = self._colours(found.pictures[0], found.placement, blur).ravel()
-            errors.append(float(self._errors(shown[:, None], self._wanted(blur), np.zeros((1, 0)))[0]))
-        return errors
-
     def _by_bin(self, found: Gradient, blur: float) -> np.ndarray:
         """The light (n, 1 + bins) and its derivatives by the index in each bin."""
-        derivative = found.derivatives[0].picture
-        assert derivative.spectral is not None
-        alone = derivative.spectral[..., None, :] * np.eye(self.target.bins, dtype=np.float32)
-        columns = [self._colours(found.base, found.placement, blur).ravel()]
-        for b in range(self.target.bins):
-            its = Picture(derivative.rgb, np.ascontiguousarray(alone[..., b, :]), derivative.bin_edges_nm)
-            columns.append(self._colours(its, found.placement, blur).ravel())
-        return np.stack(columns, axis=-1)
+        spectral = found.derivatives[0].picture.spectral
+        assert spectral is not None
+        cells = self.target.seen(spectral, found.placement)
+        alone = (_blurred(self._in_channels(cells * one), blur).ravel() for one in np.eye(self.target.bins))
+        return np.stack([self._colours(found.base, found.placement, blur).ravel(), *alone], axis=-1)
 
     def _check(self, columns: np.ndarray, dispersion: Dispersion) -> None:
         """Raise `UserError` where another dispersion would look the same."""
@@ -245,8 +223,8 @@ class Solver:
             return
         others = np.stack([columns[:, 0], columns[:, 1:] @ shapes[0]], axis=1)
         moved = 5.0 * columns[:, 1:] @ shapes[1]
-        rest = moved - others @ np.linalg.lstsq(others, moved, rcond=None)[0]
-        if not np.linalg.norm(rest) > _SAYS_NOTHING * np.linalg.norm(columns[:, 0]):
+        left = _least_squares(others, moved)[2] * np.linalg.norm(moved) if moved.any() else 0.0
+        if not left > _SAYS_NOTHING * np.linalg.norm(columns[:, 0]):
             raise UserError(_NO_COLOURS)
 
     def _around(self, columns: np.ndarray, dispersion: Dispersion) -> Fit:
@@ -271,7 +249,7 @@ class Solver:
     @property
     def _few(self) -> RenderSettings:
         """With few photons."""
-        return replace(self._settings, photons=min(self.settings.photons or _TRIED, _TRIED))
+        return replace(self._settings, photons=min(self._settings.photons or _TRIED, _TRIED))
 
     @property
     def _edges(self) -> np.ndarray:
@@ -348,6 +326,7 @@ def solution(
     work: Callable[[Solver], Generator[float, None, T]],
 ) -> Generator[float, None, T]:
     """What `work` finds for the target that `wanted` makes of the rest, pausing with the share done."""
+    settings = replace(settings, photons=settings.photons or min(stage.scene.render.photons, ENOUGH))
     its = wanted(context, stage, settings, receiver, values, between, width)
     keep_programs(context.ctx)
     try:
@@ -367,16 +346,6 @@ def _without_colours(scene: Scene, index: int) -> Scene:
         if i != index and item.material.transmits and not item.material.is_crystal:
             scene = set_dispersion_gain(scene, i, 0.0)
     return replace(scene, lights=tuple(lights))
-
-
-def _neighbours(found: Gradient, moves: np.ndarray) -> np.ndarray:
-    """Numbers of the `moves` (m, bins) of the index that change the light least. In no bin it changes by more than all
-    of it: glasses may be far apart in the violet alone, beyond some makers' data."""
-    derivative, base = found.derivatives[0].picture.spectral, found.base.spectral
-    assert derivative is not None and base is not None
-    moved = np.abs(moves) * np.linalg.norm(derivative, axis=(0, 1))
-    changes = np.minimum(moved, np.linalg.norm(base, axis=(0, 1)))
-    return np.argsort((changes**2).sum(axis=1), kind="stable")[:_TESTED]
 
 
 def width_of(light: np.ndarray) -> np.ndarray:

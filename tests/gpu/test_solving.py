@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import spectrasplat as ss
+from spectrasplat.base.generators import finished
 from spectrasplat.base.tone_map import luminance
 from spectrasplat.edit.parameters import Stage
 from spectrasplat.model.optics import catalogue
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.frames import FrameRenderer
-from spectrasplat.render.light_target import Target
-from spectrasplat.render.solving import _at_bins, _errors, _least_squares, width_of
+from spectrasplat.render.light_target import Target, axes_of
+from spectrasplat.render.solving import Solver, _at_bins, _errors, _least_squares, width_of
 
 EDGES = np.linspace(380.0, 780.0, 17)
 
@@ -58,7 +59,7 @@ def test_a_target_reads_the_map_where_it_lies() -> None:
     target = Target("floor", np.eye(3)[:2], corners, np.ones((2, 4, 4)), np.linspace(380.0, 780.0, 5))
     seen = target.seen(spectral, placement)
     upright = replace(target, corners=np.array([[0.2, 0.1, 1.0], [0.2, 0.9, 1.0], [0.3, 0.1, 1.0]]))
-    its = upright.settings(RenderSettings())
+    its = upright.settings(RenderSettings(photons=1000))
     assert (its.width, its.height) == (24, 192)  # along the map's axes, however the target's rows lie
     first = corners[0] + 0.125 * (corners[1] - corners[0]) + 0.25 * (corners[2] - corners[0])
     assert seen[0, 0] == pytest.approx([first[0], first[1], first[0] + first[1], 2.0 * first[0]], abs=1e-9)
@@ -96,6 +97,25 @@ def test_what_is_no_target_is_refused(tmp_path: Path) -> None:
         (tmp_path / "lines.csv").write_text(text)
         with pytest.raises(ss.UserError, match="lines of as many numbers"):
             ss.match(scene, "prism", "screen", tmp_path / "lines.csv", ends)
+
+
+def test_the_light_of_all_glasses_is_foreseen(gl) -> None:
+    """By the light of a few indices alone the hidden glass is among the first ten of all, from whatever glass."""
+    scene = ss.load("spectrum")
+    hidden = scene.copy()
+    hidden.objects["prism"].update(glass="Hoya FDS18")
+    target, between = light_of(hidden, "screen", seed=3)
+    model = scene._model
+    its = Solver(
+        gl,
+        Stage(model, model.camera),
+        RenderSettings(photons=20_000),
+        Target("screen", axes_of(model, "screen"), np.array(between), target, EDGES),
+    )
+    entries = [entry for entry in catalogue.entries() if entry.dispersion.is_dispersive]
+    errors = finished(its._foreseen(0, np.stack([_at_bins(entry.dispersion, EDGES) for entry in entries])))
+    first = np.argsort(errors)[:10]
+    assert "Hoya FDS18" in [entries[i].qualified_name for i in first] and errors[first[-1]] < 0.5 < np.median(errors)
 
 
 @pytest.mark.slow
