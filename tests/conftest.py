@@ -23,6 +23,11 @@ MAX_PROCESSES = 4
 """More would wait for the longest files, and crowd a graphics card that all share."""
 
 
+COMPILED_FIRST = "test_animate.py", "test_camera_reference.py", "test_photon_reference.py"
+"""Files whose first tests compile beams and references for most of a minute: begun first, each in a process of its own,
+so that no other compiles the same."""
+
+
 def usable_cores() -> int:
     """Cores this process may run on."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -45,6 +50,11 @@ os.environ.setdefault("MESA_SHADER_CACHE_DIR", platformdirs.user_cache_dir())
 # Hundreds of thousands of objects of modules and tests live to the end: looking through them again and again for what
 # nobody refers to takes a third of the time until the first test.
 gc.disable()
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files stay together and keep their order, but for `COMPILED_FIRST`."""
+    items.sort(key=lambda item: item.path.name not in COMPILED_FIRST)
 
 
 def pytest_collection_finish() -> None:
