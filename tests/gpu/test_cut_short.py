@@ -17,7 +17,10 @@ from spectrasplat.render.still import RenderResult, render
 PHOTONS = 60_000
 
 
-@pytest.mark.parametrize(("name", "method"), [("ball_caustic", "srd"), ("lens", "srd"), ("prism", "stochastic-point")])
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [("ball_caustic", "srd"), pytest.param("lens", "srd", marks=pytest.mark.slow), ("prism", "stochastic-point")],
+)
 def test_what_there_is_no_time_for_is_traced_coarsely(gl, name: str, method: str) -> None:
     """From the middle of a pass on there is time for a third of what is left. (Gaps: half of the mean and more.)"""
     settings = RenderSettings(width=128, height=72, photons=PHOTONS, spp=4, layer="caustic", batch=4096, method=method)

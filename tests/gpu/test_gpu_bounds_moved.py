@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,6 @@ import pytest
 from gl_counts import counted
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import shipped_scenes
-from spectrasplat.edit.live_inputs import LiveInputs
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.records import NONE
 from spectrasplat.gpu.scene_buffers import SceneBuffers
@@ -20,7 +18,6 @@ from spectrasplat.model.scene import Light, Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.viewer.live_light import LiveLight
-from viewer_rig import pulling, turning, viewer
 
 
 def placed(scene: Scene, matrix: np.ndarray) -> Scene:
@@ -51,24 +48,6 @@ def triangles(buffers: SceneBuffers) -> np.ndarray:
 
 def shifted(lamp: Light, step: float) -> Light:
     return replace(lamp, position=(lamp.position[0] + step, *lamp.position[1:])) if lamp.has_place else lamp
-
-
-def thrown(first: LiveInputs, count: int) -> Iterator[LiveInputs]:
-    """The first glass is turned, put anywhere, out of the light too, and back."""
-    random = np.random.default_rng(7)
-    for step in range(count):
-        away = (0.0, 1.0, 30.0, 1e4)[step % 4] * random.normal(size=3)
-        yield pulling(turning(first, random.uniform(0.0, 360.0)), away)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["default", "ball"])
-def test_wherever_things_are_put_nothing_is_made(name: str, count: int = 200) -> None:
-    with viewer(name) as rig:
-        asked = list(rig.steps(thrown(rig.wanted, count)))
-    assert len(asked) > count / 2
-    assert not any(counts.made or counts.programs or counts.finishes for counts in asked)
-    assert max(counts.written_bytes for counts in asked) <= 16 << 10
 
 
 def test_windows_stay_until_light_leaves_them(gl: Context) -> None:
