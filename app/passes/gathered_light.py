@@ -115,16 +115,16 @@ class GatheredLight:
         self._sums = [self._ctx.buffer(bytes(size)) for _ in range(max(bounces, 1))]
         self._asked_buffer = self._ctx.buffer(reserve=most_asked * DIRECTION.stride)
         self._parameters = self._ctx.buffer(reserve=PARAMETERS.stride)
-        self._sphere = specular_sphere(buffers)
+        disperses = buffers.features.environment_spectrum and not bounces
+        self._sphere = specular_sphere(buffers, with_gratings=disperses)
         edges_x, shares = spectral_taps(buffers.axis, TAPS)
         ends = np.stack([edges_x[:-1], edges_x[1:], edges_x[1:]], axis=1)[..., None]
         self._taps = np.concatenate([shares, ends], axis=2).reshape(3 * TAPS, 4)
         defines: Defines = {**buffers.features.defines(), **bindings.SCENE_DEFINES, **buffers.defines}
         defines |= {"BIND_PLACES": _BIND_PLACES, "BIND_ASKED": _BIND_ASKED, "BIND_SUMS": _BIND_SUMS}
         defines |= {"UNIT_RADIANCE": _UNIT, "MOST_ASKED": most_asked, "MAX_EVENTS": MAX_EVENTS}
-        disperses = buffers.features.environment_spectrum and not bounces
         defines |= switched(FOLLOWS_SPECULAR=self._sphere is not None, OF_RECEIVERS=bounces > 0)
-        defines |= switched(GATHERED_SPECTRUM=disperses) | {"GATHER_TAPS": TAPS}
+        defines |= switched(GATHERED_SPECTRUM=disperses, CAMERA_SPECULAR=True) | {"GATHER_TAPS": TAPS}
         defines.pop("LOBE_COLUMNS", None)
         if not disperses:  # rays of one index carry no columns
             defines["SPECTRAL_GROUPS"] = 0
@@ -190,13 +190,13 @@ class GatheredLight:
         shader.release(*self._read)
 
 
-def specular_sphere(buffers: SceneBuffers) -> np.ndarray | None:
+def specular_sphere(buffers: SceneBuffers, with_gratings: bool = False) -> np.ndarray | None:
     """What holds all glass and mirrors that rays are followed by: centre and radius, float64 (4,), GPU space; None
     where there are none."""
     corners = [
         buffers.space.to_gpu(mesh.vertices)
         for mesh, item in zip(buffers.world_meshes, buffers.scene.objects, strict=True)
-        if item.material.is_specular and not isinstance(item.material, Grating)
+        if item.material.is_specular and (with_gratings or not isinstance(item.material, Grating))
     ]
     if not corners:
         return None

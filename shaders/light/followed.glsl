@@ -21,6 +21,7 @@ struct Walk {
 };
 #include "path/event.glsl"
 #include "path/crystal.glsl"
+#include "path/grating.glsl"
 #include "path/polariser.glsl"
 
 struct FollowedRay {
@@ -106,6 +107,25 @@ bool follow_lobe(inout Path path, Event event, uint filter_row, float draw) {
     return onward;
 }
 
+// A ray into one of a grating's orders, by chance in proportion to their efficiencies; of what is deflected or weighed
+// by wavelength the anchor alone goes on. Whether it went through.
+bool follow_order(inout Path path, Hit hit, Event event, uint row, uint key, uint number) {
+    GratingEvent met = grating_event(path, event.frame.normal, hit, row);
+    float all = 0.0;
+    for (uint k = 0u; k < met.grating.orders; ++k) all += order_at(row, k).efficiency;
+    float left = unit_float(hash_combine(key, number)) * all;
+    uint chosen = 0u;
+    for (; chosen + 1u < met.grating.orders && left >= order_at(row, chosen).efficiency; ++chosen)
+        left -= order_at(row, chosen).efficiency;
+    GratingOrder order = order_drawn(met, chosen, 0u, number, key);
+    if (order.shift_per_um != 0.0 || (GRATING_PROFILES && met.grating.profile != 0u)) keep_anchor(path);
+    bool exists = order_passes(met, order, path.direction, path.band.y), geometric;
+    float share = order_shares(met, order, chosen, path, path.band, true).y * all / max(order.efficiency, 1e-9);
+    for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= exists ? share : 0.0;
+    diffract_path(path, event, met, order, geometric);
+    return !is_reflective(met.grating);
+}
+
 // `walk`: with its wavelengths; `x_anchor`: one of them, or that of the index. `lost`: 1 where the ray was given up
 // after MAX_EVENTS.
 FollowedRay follow_specular(
@@ -121,7 +141,8 @@ FollowedRay follow_specular(
         bool met = intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
         Object thing = object_at(met ? hit.object : 0u);
         uint kind = met ? thing.kind : NONE;
-        follows = kind == KIND_MIRROR || IS_GLASS(kind) || (HAS_POLARISER && kind == KIND_POLARISER);
+        bool grating = HAS_GRATING && GATHERED_SPECTRUM && kind == KIND_GRATING;
+        follows = kind == KIND_MIRROR || IS_GLASS(kind) || (HAS_POLARISER && kind == KIND_POLARISER) || grating;
         bool entering = dot(path.direction, hit.normal_g) < 0.0;
         if (ABSORPTION) {
             // A place in a liquid learns so where it leaves it.
@@ -157,6 +178,8 @@ FollowedRay follow_specular(
             }
             if (HAS_CRYSTAL && crystal)
                 passes = follow_lobe(path, event, thing.texture, unit_float(hash_combine(key, number)));
+            if (HAS_GRATING && GATHERED_SPECTRUM && grating)
+                passes = follow_order(path, hit, event, thing.weight_row, key, number);
             if (HAS_POLARISER && kind == KIND_POLARISER) {
                 if (GATHERED_SPECTRUM && thing.medium != NONE) keep_anchor(path);
                 float share = pass_polariser(path, crystal_at(thing.receiver)).y;
@@ -186,7 +209,7 @@ FollowedRay follow_specular(
                         tint_by(path.walk, uint(WEIGHT_ROW) + thing.texture, -1.0);
                 }
             }
-            if (!passes && !crystal) unhidden *= reflect_path(path, event, geometric);
+            if (!passes && !crystal && !grating) unhidden *= reflect_path(path, event, geometric);
             for (int t = 0; t < TINTS; ++t) path.walk.tint[t] *= unhidden.y;
             leave_surface(path, hit, passes ? entering : !entering);
             lost = float(number + 1u == uint(MAX_EVENTS));

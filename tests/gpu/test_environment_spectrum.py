@@ -23,7 +23,7 @@ from spectrasplat.model.optics.glass import from_abbe
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.model.panorama_lights import with_panorama_lights
 from spectrasplat.model.placement import rotation_about
-from spectrasplat.model.scene import Black, Camera, Dielectric, Diffuse, Scene, SceneObject
+from spectrasplat.model.scene import Black, Camera, Dielectric, Diffuse, Grating, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.texture import Environment
 from spectrasplat.passes.environment_light import EnvironmentLightPass
@@ -89,6 +89,25 @@ def test_dispersive_glass_takes_no_light_out_of_a_furnace(gl: Context, mesh: Mes
     scene = scene_of(mesh, constant((1.0, 1.0, 1.0)), (0.0, 0.0, 0.7), None, (0.02, 0.02, 0.0))
     light = found(gl, scene, 16384, 0.02).all / math.pi
     np.testing.assert_allclose(light.mean(axis=(0, 1)), 1.0, atol=1e-3)
+
+
+@pytest.mark.parametrize("reflects", [False, True])
+def test_a_grating_sends_an_even_sky_on_by_its_orders(gl: Context, reflects: bool) -> None:
+    """A place under a wide sheet receives an even sky through it, or over it: all of order 0, and of another one those
+    directions whose parts in the sheet, a disc of radius 1, are still in that disc once they are shifted by m λ / Λ."""
+    sheet = Grating(1200.0, (0, 1), (0.3, 0.6), reflects=reflects)
+    scene = scene_of(primitives.plane(80.0, 80.0), constant((1.0, 1.0, 1.0)), (0.0, 0.0, 0.0), None, (0.02, 0.02, 0.0))
+    higher = np.eye(4)
+    higher[2, 3] = 0.2
+    above = replace(scene.objects[0], material=sheet, object_to_world=higher)
+    scene = replace(scene, objects=(above, scene.objects[1]))
+    axis = SpectralAxis.build([FLINT])
+    edges_x, shares = spectral_taps(axis, 400)
+    shift = np.minimum(1.2e-3 * axis.nm_of_x(0.5 * (edges_x[1:] + edges_x[:-1])), 2.0)
+    common = (2.0 * np.arccos(0.5 * shift) - 0.5 * shift * np.sqrt(4.0 - shift**2)) / math.pi
+    expected = 0.3 + 0.6 * (shares.sum(axis=1) * common[:, None]).sum(axis=0)
+    light = found(gl, scene, 16384, 0.02).all / math.pi
+    np.testing.assert_allclose(light.mean(axis=(0, 1)), expected, atol=2e-3)
 
 
 def test_a_window_lands_behind_a_prism_where_snells_law_has_it(gl: Context) -> None:

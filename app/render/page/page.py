@@ -141,7 +141,7 @@ def check_page(scene: Scene, receiver: str) -> None:
 def _why_not(item: SceneObject) -> str | None:
     """Why no page can show the light on a receiver; None: one can."""
     if not item.mesh.is_flat:
-        return f"'{item.name}' is curved, and a page shows light on flat receivers only"
+        return f"'{item.name}' is not one flat face, and a page shows light on flat receivers only"
     if item.material.texture is not None:
         return f"'{item.name}' wears a picture, and a page shows light on receivers of one colour only"
     return None
