@@ -42,6 +42,8 @@ _BLURS = (0.12, 0.04, 0.0)
 """Standard deviations, of the target's longer side."""
 _STEPS = 8
 """With each blur, at most."""
+_BLOCKS = 8
+"""Along a target's sides, within which what is left over may be alike."""
 _TRUST = 0.5
 """Largest change, as a share of the picture's norm, that a linear prediction is believed."""
 _NO_COLOURS = (
@@ -77,7 +79,9 @@ class Solver:
         for number, blur in enumerate(self._blurs):
             for step in range(_STEPS):
                 begun = (number + step / _STEPS) / len(self._blurs)
-                columns = yield from part_of(self._columns(at, paths, blur), begun, 1.0 / (len(self._blurs) * _STEPS))
+                steps = self._gradient(self._moved(at, paths), paths)
+                found = yield from part_of(steps, begun, 1.0 / (len(self._blurs) * _STEPS))
+                columns = self._columns(found, blur)
                 move, covariance, error = self._solved(columns, blur)
                 taken += 1
                 for path, column in zip(paths, columns.T[1:], strict=True):
@@ -93,19 +97,29 @@ class Solver:
         self._check_ends(columns)
         if not error < _HARDLY:
             raise UserError("no values were found that cast such light there: begin with values that are nearer")
+        covariance = covariance + self._doubt(move, self._columns(found, self._blurs[-2:][0]))
         start = {path: 0.0 if path.endswith(f".{INDEX}") else value_of(self.stage, path) for path in paths}
         values = {path: start[path] + float(change) for path, change in zip(paths, at, strict=True)}
         deviations = dict(zip(paths, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         return Fit(values, deviations, covariance, error, taken)
 
-    def _columns(self, at: np.ndarray, paths: Sequence[str], blur: float) -> Generator[float, None, np.ndarray]:
-        """The light (n, 1 + paths) of the scene moved by `at`, and its derivatives."""
+    def _moved(self, at: np.ndarray, paths: Sequence[str]) -> Stage:
         stage = self.stage
         for path, change in zip(paths, at, strict=True):
             stage = nudged(stage, path, float(change)) if change else stage
-        found = yield from self._gradient(stage, paths)
+        return stage
+
+    def _columns(self, found: Gradient, blur: float) -> np.ndarray:
+        """The light (n, 1 + paths) and its derivatives."""
         pictures = [found.base, *(each.picture for each in found.derivatives)]
         return np.stack([self._colours(p, found.placement, blur).ravel() for p in pictures], axis=-1)
+
+    def _doubt(self, move: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Variances by details that lights have from texels and footprints alone: how another `move` is with blurred
+        `columns`, where chance does not say it."""
+        softer, covariance, _ = self._solved(columns, self._blurs[-2:][0])
+        square = (softer - move) ** 2
+        return np.diag(np.where(square > 4.0 * np.diag(covariance), square, 0.0))
 
     # ---- glasses -----------------------------------------------------------------------------
 
@@ -144,7 +158,7 @@ class Solver:
         ranked = tuple(
             Ranked(names[i], entries[i].dispersion.n_d, entries[i].dispersion.V_d, float(errors[i])) for i in order
         )
-        return Match(ranked, self._around(columns, entries[best].dispersion))
+        return Match(ranked, self._around((yield from derived(best)), entries[best].dispersion))
 
     def _may_be(self, index: int, dispersion: Dispersion) -> bool:
         """Whether its data hold for every light of the scene."""
@@ -227,15 +241,18 @@ class Solver:
         if not left > _SAYS_NOTHING * np.linalg.norm(columns[:, 0]):
             raise UserError(_NO_COLOURS)
 
-    def _around(self, columns: np.ndarray, dispersion: Dispersion) -> Fit:
-        """n_d and V_d near those of a glass."""
-        shapes = _shapes(dispersion, self._edges)
-        both = np.stack([columns[:, 0], *(columns[:, 1:] @ shape for shape in shapes)], axis=1)
-        if self.target.width is not None:  # which n_d, it does not say
-            move, covariance, error = self._solved(both[:, ::2], 0.0)
+    def _around(self, found: Gradient, dispersion: Dispersion) -> Fit:
+        """n_d and V_d near those of a glass; of a width V_d, for it does not say which n_d."""
+        shapes = _shapes(dispersion, self._edges)[slice(None) if self.target.width is None else slice(1, None)]
+
+        def both(blur: float) -> np.ndarray:
+            columns = self._by_bin(found, blur)
+            return np.stack([columns[:, 0], *(columns[:, 1:] @ shape for shape in shapes)], axis=1)
+
+        move, covariance, error = self._solved(both(0.0), 0.0)
+        covariance = covariance + self._doubt(move, both(self._blurs[-2:][0]))
+        if self.target.width is not None:
             move, covariance = np.append(0.0, move), np.full((2, 2), np.nan)
-        else:
-            move, covariance, error = self._solved(both, 0.0)
         values = {"n_d": dispersion.n_d + float(move[0]), "V_d": dispersion.V_d + float(move[1])}
         deviations = dict(zip(values, np.sqrt(np.diag(covariance)).tolist(), strict=True))
         return Fit(values, deviations, covariance, error, 1)
@@ -301,7 +318,10 @@ class Solver:
     def _solved(self, columns: np.ndarray, blur: float) -> tuple[np.ndarray, np.ndarray, float]:
         """See `_least_squares`; of a width the one move that makes it, whose variance is not known."""
         if self.target.width is None:
-            return _least_squares(columns, self._wanted(blur))
+            h, w, channels = self.target.values.shape
+            rows, across = (np.arange(n) * _BLOCKS // n for n in (h, w))
+            block = np.repeat((rows[:, None] * _BLOCKS + across).ravel(), channels)
+            return _least_squares(columns, self._wanted(blur), block)
         h = 1e-2 * np.linalg.norm(columns[:, 0]) / max(float(np.linalg.norm(columns[:, 1])), 1e-300)
         low, found, high = self._widths(columns, np.array([[-h], [0.0], [h]]))
         if not abs(high - low) > 1e-9:
@@ -397,14 +417,21 @@ def _errors(columns: np.ndarray, wanted: np.ndarray, moves: np.ndarray) -> np.nd
     return np.where(size <= _TRUST**2 * gram[0, 0], errors, np.inf)
 
 
-def _least_squares(columns: np.ndarray, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Moves (k,) with which brightness · (columns[:, 0] + columns[:, 1:] moves) is nearest to `wanted`, their
-    covariance and what is left over as a share."""
+def _least_squares(
+    columns: np.ndarray, wanted: np.ndarray, block: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Moves (k,) with which brightness · (columns[:, 0] + columns[:, 1:] moves) is nearest to `wanted` (n,), their
+    covariance and what is left over as a share.
+
+    What is left over may be alike within a `block` (n,), by number; None: it is noise. A. C. Cameron and D. L. Miller,
+    A Practitioner's Guide to Cluster-Robust Inference, Journal of Human Resources 50 (2015) 317."""
     solved = np.linalg.lstsq(columns, wanted, rcond=1e-9)[0]
     rest = wanted - columns @ solved
-    spread = float(rest @ rest) / max(len(wanted) - columns.shape[1], 1)
     scale = solved[0] if abs(solved[0]) > 0.0 else 1.0
-    covariance = spread * np.linalg.pinv(columns.T @ columns, rcond=1e-18)
+    inverse = np.linalg.pinv(columns.T @ columns, rcond=1e-18)
+    each = np.arange(len(wanted)) if block is None else block
+    pulls = np.stack([np.bincount(each, column * rest) for column in columns.T])
+    covariance = inverse @ (pulls @ pulls.T) @ inverse
     # Of a quotient: moves are solved[1:] / solved[0].
     turn = np.concatenate([-(solved[1:] / scale)[:, None], np.eye(len(solved) - 1)], axis=1) / scale
     error = float(np.linalg.norm(rest) / np.linalg.norm(wanted))
