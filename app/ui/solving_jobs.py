@@ -182,7 +182,9 @@ def _judge(request: requests.JudgeStone, state: State, found: FoundPictures) -> 
         report = yield from _on_thread(lambda progress, stopped: gem_report(stone, report=progress, cancelled=stopped))
         if report is not None:
             rows = tuple((name, f"{value}  {meaning}") for name, value, meaning in report.rows())
-            found.keep("gem", Found((item,), rows, _codes(np.hstack(list(report.pictures.values())))))
+            aset, ideal_scope, brightness, fire = report.pictures.values()
+            shown = np.vstack([np.hstack([aset, ideal_scope]), np.hstack([brightness, fire])])
+            found.keep("gem", Found((item,), rows, _codes(shown)))
 
     words = f"Figures of {item.name}", "Figures and pictures are in the Gem panel.", "The stone was not judged."
     return Words(*words), work()

@@ -28,7 +28,7 @@ def test_a_stone_is_judged_in_the_window(gl: Context) -> None:
             note = exports.step(0.05)
         assert note is not None and "Gem panel" in note
         found = exports.found.entries().get("gem")
-        assert found is not None and found.codes.shape == (512, 2048, 3) and dict(found.rows)["leak"]
+        assert found is not None and found.codes.shape == (1024, 1024, 3) and dict(found.rows)["leak"]
         rig.view_model = replace(rig.view_model, found={"gem": found})
         rig.frame(2)
         assert {"ISO", "Fire", "Scintillation"} <= set(rig.items.items)
