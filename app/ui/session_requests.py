@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -283,9 +283,7 @@ _HANDLERS: dict[type, Callable[[Session, Any], Answer | None]] = {
     requests.RenderPicture: _export,
     requests.Bake: _export,
     requests.Animate: _export,
-    requests.MatchGlass: _export,
-    requests.Derive: _export,
-    requests.CheckPlate: _export,
+    **dict.fromkeys(get_args(requests.Solving), _export),
     requests.CancelJob: lambda session, _: session.jobs.cancel_export(),
     requests.ComputeReference: lambda session, _: session.jobs.comparison.restart(),
     requests.CopyMaterial: _copy_material,

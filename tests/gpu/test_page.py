@@ -22,7 +22,7 @@ from spectrasplat.render.page.page import check_page, check_page_path, decimated
 
 def test_what_can_be_no_page_says_why(tmp_path: Path) -> None:
     bowl = BALL["objects"][0] | {"name": "bowl", "glass": None, "material": {"kind": "diffuse"}}
-    with pytest.raises(UserError, match="'bowl' is curved"):
+    with pytest.raises(UserError, match="'bowl' is not one flat face"):
         check_page(ss.Scene(BALL | {"objects": [*BALL["objects"], bowl]})._model, "bowl")
     with pytest.raises(UserError, match="wears a picture"):
         check_page(ss.load("lens_text")._model, "page")
