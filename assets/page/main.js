@@ -99,7 +99,7 @@ async function start() {
     dirty.tables = dirty.map = dirty.glass = false;
     clearTimeout(settle);
     if (state.playing) queue();
-    else if (moves) settle = setTimeout(settled, SETTLED_MS);
+    else if (moves) settle = setTimeout(settled, SETTLED_MS + times.frame);
   }
 
   // Reading a pixel waits until the picture is drawn.

@@ -41,9 +41,9 @@ def gems(context: Context, glasses: Sequence[tuple[str, Dispersion]]) -> Measure
 
 # ---- shipped scenes ----------------------------------------------------------------------------
 
-LEFT_IN_MAPS = {"lens_text": 0.05, "water": 0.05, "wine_glass": 0.03}
+LEFT_IN_MAPS = {"lens_text": 0.05, "soap_bubble": 0.05, "water": 0.05, "wine_glass": 0.03}
 """Where light falls over a receiver's whole width, or on curved ones, footprints reach over edges: that share is lost
-and noted."""
+and noted. Of a table that reaches to the horizon the last texels of a small picture's map are wide, and count whole."""
 MAP = 0.01
 """What a map may lack or have too much elsewhere: splats are cut off at four standard deviations and at windows'
 borders."""
