@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -18,12 +18,14 @@ from ..passes.camera import CameraPass
 from ..render.device_scene import scene_buffers
 from ..render.light_pass import LightPass
 from ..render.photon_batches import traced_besides
-from .device_costs import repeated
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
     from ..model.scene import Scene
 
+T = TypeVar("T")
+_RUNS, _PATIENCE_S = 21, 1.0
+"""Of each measurement at most; none is begun after so many seconds, but for the first three."""
 SCHEDULES = {f"{each}, then all": (each,) * (32 // each) + (4096,) for each in (1, 4, 8)} | {"1, in order": ()}
 """By name: `DeviceTraits.ray_events`."""
 
@@ -64,6 +66,15 @@ def _ms(seconds: float) -> float:
 def _spread(spent: Sequence[float]) -> dict[str, float]:
     """Of seconds."""
     return {"ms": _ms(float(np.median(spent))), "p95_ms": _ms(float(np.percentile(spent, 95))), "runs": len(spent)}
+
+
+def repeated(run: Callable[[int], T]) -> list[T]:
+    """What `run` of 1, 2, … gives; that of 0 only warms up."""
+    run(0)
+    found, started = [run(1)], time.perf_counter()
+    while len(found) < 3 or (len(found) < _RUNS and time.perf_counter() - started < _PATIENCE_S):
+        found.append(run(len(found) + 1))
+    return found
 
 
 def photons_within(costs: Sequence[FrameCost], seconds: float, with_camera: bool) -> int:

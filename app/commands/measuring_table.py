@@ -15,7 +15,7 @@ MAX_SEEDS = 1000
 MAX_BENCH_SECONDS = 3600.0
 MAX_RANDOM = 1000
 PROOF_PARTS = ("programs", "answers", "pictures", "stress")
-MEASURED_PARTS = ("dispatch", "frames", "trace", "camera", "viewer", "start", "compile", "additions", "splats")
+MEASURED_PARTS = ("frames", "trace", "camera", "viewer", "start")
 """What `prove-gpu` does after the doctor: the keys of `proof_steps.PARTS`."""
 _bench_seconds = options.seconds(MAX_BENCH_SECONDS)
 _REFERENCE = Option(

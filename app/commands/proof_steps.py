@@ -35,8 +35,6 @@ _MOST_COMPILERS = 8
 _SCREEN = (1920, 1080)
 _CACHE_FOLDERS = ("XDG_CACHE_HOME", "MESA_SHADER_CACHE_DIR", "__GL_SHADER_DISK_CACHE_PATH")
 """Where drivers and SpectraSplat keep programs."""
-_NO_CACHE = {"MESA_SHADER_CACHE_DISABLE": "true", "__GL_SHADER_DISK_CACHE": "0"}
-"""Drivers keep none."""
 Figures = dict[str, int | float]
 
 
@@ -239,14 +237,6 @@ def _png(picture: np.ndarray, reference: np.ndarray) -> str:
 # -- times --------------------------------------------------------------------------------
 
 
-def _dispatch(short: bool, _folder: Path) -> Iterator[Finding]:
-    from ..bench import device_costs
-    from ..gpu.context import create_context
-
-    with create_context() as context:
-        yield from _measured(device_costs.dispatch_costs(context, 100 if short else 2000))
-
-
 def _frames(short: bool, _folder: Path) -> Iterator[Finding]:
     """Photons traced anew every frame, at the size of a screen."""
     from ..bench import frame_speed
@@ -316,42 +306,6 @@ def _start(short: bool, _folder: Path) -> Iterator[Finding]:
                 yield _finding(f"{name}, {state}", {"first_picture_s": round(time.perf_counter() - started, 3)})
 
 
-def _compile(short: bool, _folder: Path) -> Iterator[Finding]:
-    from ..base.paths import shipped_scenes
-    from ..bench.device_costs import compile_times
-    from ..gpu.context import create_context
-
-    os.environ |= _NO_CACHE
-    for name in ("prism",) if short else ("prism", "default"):
-        with tempfile.TemporaryDirectory() as first, tempfile.TemporaryDirectory() as second:
-            os.environ["XDG_CACHE_HOME"] = first
-            compiled = _compiled(shipped_scenes()[name])
-            os.environ["XDG_CACHE_HOME"] = second
-            found = compile_times(compiled.programs, create_context)
-            yield from _measured((f"{name}, {what}", figures) for what, figures in found)
-
-
-def _additions(short: bool, _folder: Path) -> Iterator[Finding]:
-    from ..bench.device_costs import addition_rates
-    from ..gpu.context import create_context
-
-    with create_context() as context:
-        yield from _measured(addition_rates(context, 1 << (14 if short else 21)))
-
-
-def _splats(short: bool, _folder: Path) -> Iterator[Finding]:
-    from ..bench import splat_speed
-    from ..gpu import shader
-    from ..gpu.context import create_context
-
-    with create_context() as context:
-        shader.keep_programs(context.ctx)
-        for texels in (16, 64, 256, 1024, 4096, 16384):
-            found = splat_speed.measure(context.ctx, texels, (1 << (18 if short else 25)) // max(texels, 64))
-            yield _finding(f"{texels} texels", {name: float(f"{rate:.3g}") for name, rate in found.items()})
-        shader.forget_programs(context.ctx)
-
-
 def _scenes(
     short: bool, names: tuple[str, ...] = ("prism", "default", "brilliant", "ball")
 ) -> Iterator[tuple[str, Scene]]:
@@ -378,15 +332,11 @@ PARTS = (
     Part("answers", "Known answers", _answers, (90, 120)),
     Part("pictures", "Pictures against stored ones", _pictures, (240, 240)),
     Part("stress", "Stress", _stress, (120, 240)),
-    Part("dispatch", "Dispatches, waits, reads", _dispatch, (10, 15), True),
     Part("frames", "Photons of a frame", _frames, (110, 200), True),
     Part("trace", "Tracing, by events a dispatch and rays in flight", _trace, (80, 90), True),
     Part("camera", "Camera samples, by the longest dispatch allowed", _camera, (50, 90), True),
     Part("viewer", "Viewer while something moves", _viewer, (70, 120), True),
     Part("start", "First picture, with an empty cache and with a full one", _start, (60, 90), True),
-    Part("compile", "Programs alone, and together", _compile, (90, 90), True),
-    Part("additions", "Additions to memory", _additions, (10, 15), True),
-    Part("splats", "Splats, by area", _splats, (30, 30), True),
 )
 """In this order: what must hold first, then what is only measured, the most important first."""
 

@@ -113,12 +113,12 @@ def _from_environment() -> str:
     raise UserError(f"{ENVIRONMENT_VARIABLE} is '{name}', which is no way to draw splats{hint}")
 
 
-def blending_rate(ctx: moderngl.Context, dtype: str = "f4") -> float:
-    """Fragments that the device adds to an RGBA texture of `dtype` (moderngl's) a second, by the wall clock: the best
-    of rounds that end when it is no longer slow, or after `_PATIENCE_S`."""
+def blending_rate(ctx: moderngl.Context) -> float:
+    """Fragments that the device adds to an RGBA32F texture a second, by the wall clock: the best of rounds that end
+    when it is no longer slow, or after `_PATIENCE_S`."""
     import moderngl
 
-    texture = ctx.texture((_SIDE, _SIDE), 4, dtype=dtype)
+    texture = ctx.texture((_SIDE, _SIDE), 4, dtype="f4")
     framebuffer = ctx.framebuffer([texture])
     program = ctx.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)
     array = ctx.vertex_array(program, [])

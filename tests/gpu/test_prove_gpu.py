@@ -69,14 +69,18 @@ def test_a_driver_that_crashes_ends_one_part(
     assert "SIGSEGV" in capsys.readouterr().out
 
 
-def test_figures_are_lines_of_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, proof = proved(tmp_path, "--quick", "--short", "--parts", "dispatch,additions")
+def test_figures_are_lines_of_json(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = '{"name": "prism, cold", "value": "first picture s 1.5", "figures": {"first_picture_s": 1.5}}\n'
+    told(monkeypatch, start=f"out.write({found!r})")
+    code, proof = proved(tmp_path, "--quick", "--short", "--parts", "camera,start")
     out = capsys.readouterr().out
     lines = [json.loads(line) for line in out.splitlines()]
     assert code == 0 and out == (tmp_path / "figures.jsonl").read_text()
-    assert [line["part"] for line in lines if "ended" in line] == ["doctor", "dispatch", "additions"]
-    assert all(line["us"] > 0.0 for line in lines if line["part"] == "dispatch" and "ended" not in line)
-    assert any("RGBA16F" in line.get("name", "") and line["texels_g_per_s"] > 0.0 for line in lines)
+    assert [line["part"] for line in lines if "ended" in line] == ["doctor", "camera", "start"]
+    figures = [line for line in lines if line["part"] == "start" and "ended" not in line]
+    assert figures == [{"part": "start", "name": "prism, cold", "first_picture_s": 1.5}]
     assert proof["quick"] and proof["short"]
 
 
@@ -119,7 +123,7 @@ def test_without_a_device_nothing_else_is_tried(tmp_path: Path, monkeypatch: pyt
 def test_a_device_that_lacks_something_is_measured_all_the_same(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lacking = '{"name": "OSMesa", "value": "missing", "broken": true}\n'
+    lacking = '{"name": "limit of something", "value": "missing", "broken": true}\n'
     told(monkeypatch, doctor=f"out.write({lacking + SOFTWARE!r})")
     code, proof = proved(tmp_path, "--parts", "answers")
     assert code == prove_gpu.FIRST_CODE
