@@ -144,7 +144,6 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     from ..features.features import Features
     from ..model.flat_faces import with_flat_faces
     from ..model.settings import RenderSettings
-    from .inspect_camera import lookups
     from .inspect_features import record_words, static_costs
 
     wishes = scene.render
@@ -159,7 +158,6 @@ def _compiled(scene: Scene) -> list[RenderableType]:
     return [
         table("Compiled into the programs", ("part", " ", "why", "costs"), rows),
         record_words(features),
-        table("Looked up by camera rays", ("what", "content", "how", "memory"), lookups(scene, features)),
     ]
 
 
