@@ -16,56 +16,17 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 if TYPE_CHECKING:
     from .api import *  # noqa: F403 - the names of its `__all__`
 
-_OFFERED = (
-    "CausticMap",
-    "Entries",
-    "Fan",
-    "Fit",
-    "Glass",
-    "GemFigures",
-    "GemReport",
-    "Gradient",
-    "LensTable",
-    "Match",
-    "Photons",
-    "Picture",
-    "PlateReport",
-    "Ranked",
-    "Scene",
-    "Session",
-    "Statistics",
-    "SweepPoint",
-    "Table",
-    "UserError",
-    "View",
-    "caustic",
-    "fan",
-    "fit",
-    "gem",
-    "glass",
-    "glasses",
-    "gradient",
-    "lens_check",
-    "lens_table",
-    "load",
-    "match",
-    "page",
-    "render",
-    "scenes",
-    "sweep",
-    "trace",
-)
-
 
 def __getattr__(name: str) -> object:
     """What `api` offers, imported when it is first asked for: the command line starts without it."""
     if name == "render":
         return import_module(".render", __name__)  # which can be called
-    if name not in (*_OFFERED, "called_render"):
+    api = None if name.startswith("_") else import_module(".api", __name__)
+    offered = "render" if name == "called_render" else name
+    if api is None or offered not in api.__all__:
         raise AttributeError(f"module 'spectrasplat' has no attribute '{name}'")
-    api = import_module(".api", __name__)
-    return getattr(api, name.removeprefix("called_"))
+    return getattr(api, offered)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_OFFERED})
+    return sorted({*globals(), *import_module(".api", __name__).__all__})
