@@ -284,7 +284,7 @@ def _of_numbers(thing: Light | Material) -> dict[str, Parameter]:
     for name, number in _animated_numbers(thing).items():
         animated = number.animated
         assert animated is not None
-        found[name] = Parameter(animated.meaning, number.unit, animated.low, animated.high)
+        found[name] = Parameter(animated.meaning, number.unit, *number.span(animated))
     return found
 
 

@@ -15,6 +15,9 @@ from ..base.errors import UserError
 from .io.scene_pictures import kept_name
 from .io.scene_table import REQUIRED, SceneTable, broken_limit
 
+_LEAST, _MOST = 1e-6, 1e6
+"""Ends of the rows of numbers without bounds."""
+
 
 class Part:
     """Some keys of a table that become some attributes of a value, and the way back."""
@@ -35,8 +38,9 @@ class Animated:
     """What an animation may do with a number."""
 
     meaning: str
-    low: float
-    high: float
+    low: float | None = None
+    high: float | None = None
+    """None: the number's own bounds, as in `Row`."""
     name: str = ""
     """Its name in an animation, where that is not the attribute's."""
 
@@ -47,9 +51,10 @@ class Row:
 
     label: str
     tip: str
-    low: float = 1e-6
-    high: float = 1e6
+    low: float | None = None
+    high: float | None = None
     reset: float | None = None
+    """None: the number's default."""
     format: str = "%.4g"
     bounded_by: str = ""
     """Attribute that `high` and `reset` are, where they are not fixed."""
@@ -100,6 +105,12 @@ class Number(Field):
         """The number."""
         limits = {"above": self.above, "at_least": self.at_least, "below": self.below, "at_most": self.at_most}
         return table.number(key, self.default, **limits)  # type: ignore[arg-type]
+
+    def span(self, of: Row | Animated) -> tuple[float, float]:
+        """From where to where a row or an animation goes: as it says, or else as far as the number may."""
+        low = self.at_least if of.low is None else of.low
+        high = self.at_most if of.high is None else of.high
+        return _LEAST if low is None else low, _MOST if high is None else high
 
     def broken_limit(self, number: float) -> str | None:
         """What `number` must be that it is not, such as "above 0"; None where it lies within the bounds."""

@@ -21,13 +21,12 @@ _DIAMETER = Number(
         "Angular diameter",
         "How large the source looks from the scene. The sun has 0.53°; 0 is perfectly parallel and gives the sharpest "
         "colours.",
-        0.0,
-        20.0,
-        SUN_DIAMETER_DEG,
-        "%.2f",
+        high=20.0,
+        reset=SUN_DIAMETER_DEG,
+        format="%.2f",
         is_slider=True,
     ),
-    animated=Animated("Angular diameter", 0.0, 90.0),
+    animated=Animated("Angular diameter"),
 )
 
 

@@ -49,9 +49,7 @@ _HALF_ANGLE = Number(
         "Half angle",
         "Half the opening angle of the cone; beyond it there is no light.",
         0.1,
-        90.0,
-        30.0,
-        "%.1f",
+        format="%.1f",
         is_slider=True,
     ),
     animated=Animated("Half angle of the cone", 0.01, 180.0, "half_angle_deg"),
@@ -63,12 +61,11 @@ _INNER = Number(
     row=Row(
         "Full within",
         "Half angle up to which the cone is at full strength; between the two it fades. Equal: a hard edge.",
-        0.0,
         format="%.1f",
         bounded_by="outer_half_angle_deg",
         is_slider=True,
     ),
-    animated=Animated("Half angle of the cone's full brightness", 0.0, 180.0),
+    animated=Animated("Half angle of the cone's full brightness", high=180.0),
 )
 
 

@@ -25,13 +25,11 @@ FILM_NM = Number(
         "Film",
         "Thickness of a film of liquid on its surface, such as oil on water, whose colours change with it; of a thin "
         "sheet, its own: a soap film has 100 to 1000. 0: none.",
-        0.0,
-        2000.0,
-        0.0,
-        "%.0f",
+        high=2000.0,
+        format="%.0f",
         is_slider=True,
     ),
-    animated=Animated("Thickness of the film on a surface of glass, nm", 0.0, MAX_NM),
+    animated=Animated("Thickness of the film on a surface of glass, nm"),
 )
 FILM_INDEX = Number("film_index", 1.33, optional=True, at_least=1.0, at_most=5.0)
 FILM_FROM_NM = Number(
@@ -44,13 +42,11 @@ FILM_FROM_NM = Number(
     row=Row(
         "Film begins",
         "Thickness where a film that varies begins; it ends with that of the film.",
-        0.0,
-        2000.0,
-        0.0,
-        "%.0f",
+        high=2000.0,
+        format="%.0f",
         is_slider=True,
     ),
-    animated=Animated("Thickness of a film that varies, where it begins, nm", 0.0, MAX_NM),
+    animated=Animated("Thickness of a film that varies, where it begins, nm"),
 )
 RADIUS = (0.0, 0.0, 0.0)
 

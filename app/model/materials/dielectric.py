@@ -35,13 +35,10 @@ ROUGHNESS = Number(
     row=Row(
         "Roughness",
         "How rough all of its surface is: 0 polished, 0.3 frosted or brushed, 1 as matt as may be.",
-        0.0,
-        1.0,
-        0.0,
-        "%.3f",
+        format="%.3f",
         is_slider=True,
     ),
-    animated=Animated("Roughness of the surface of glass or a mirror; 0 is polished", 0.0, 1.0),
+    animated=Animated("Roughness of the surface of glass or a mirror; 0 is polished"),
 )
 THIN = Flag(
     "thin",

@@ -36,13 +36,11 @@ ROUGHNESS = Number(
     row=Row(
         "Roughness",
         "Of the coat: 0 is polished like glass, 0.25 a varnished table, 1 reflects to all sides.",
-        0.0,
-        1.0,
-        USUAL_ROUGHNESS,
-        "%.3f",
+        reset=USUAL_ROUGHNESS,
+        format="%.3f",
         is_slider=True,
     ),
-    animated=Animated("Roughness of a receiver's coat", 0.0, 1.0),
+    animated=Animated("Roughness of a receiver's coat"),
 )
 COAT_INDEX = Number(
     "coat_index",
@@ -53,13 +51,10 @@ COAT_INDEX = Number(
     row=Row(
         "Coat's index",
         "Refractive index of the coat: how much it reflects, 4 % at 1.5 where it is seen from straight above.",
-        1.0,
-        4.0,
-        USUAL_COAT_INDEX,
-        "%.3f",
+        format="%.3f",
         is_slider=True,
     ),
-    animated=Animated("Refractive index of a receiver's coat", 1.0, 4.0),
+    animated=Animated("Refractive index of a receiver's coat"),
 )
 DIFFUSE_ROUGHNESS = Number(
     "diffuse_roughness",
@@ -70,13 +65,10 @@ DIFFUSE_ROUGHNESS = Number(
     row=Row(
         "Diffuse roughness",
         "0 is Lambertian; with 1 (plaster, clay, the moon) what is lit from behind the camera looks flat.",
-        0.0,
-        1.0,
-        0.0,
-        "%.3f",
+        format="%.3f",
         is_slider=True,
     ),
-    animated=Animated("Roughness of a receiver's diffuse base", 0.0, 1.0),
+    animated=Animated("Roughness of a receiver's diffuse base"),
 )
 
 

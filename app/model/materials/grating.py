@@ -35,15 +35,8 @@ _LINES = Number(
     unit="1/mm",
     at_least=MIN_LINES,
     at_most=MAX_LINES,
-    row=Row(
-        "Lines",
-        "How many lines there are to the millimetre: the more, the wider colours part.",
-        MIN_LINES,
-        MAX_LINES,
-        600.0,
-        "%.5g",
-    ),
-    animated=Animated("Lines of a grating to the millimetre", MIN_LINES, MAX_LINES),
+    row=Row("Lines", "How many lines there are to the millimetre: the more, the wider colours part.", format="%.5g"),
+    animated=Animated("Lines of a grating to the millimetre"),
 )
 _GROOVES = Number(
     "grooves",
@@ -55,13 +48,11 @@ _GROOVES = Number(
         "Grooves lit",
         "How many lines the light covers, N: order m resolves wavelengths that differ by a part in m N. 0: so many "
         "that spectral lines have no width.",
-        0.0,
-        5000.0,
-        0.0,
-        "%.0f",
+        high=5000.0,
+        format="%.0f",
         is_slider=True,
     ),
-    animated=Animated("Lines of a grating that light covers", 1.0, 1e7),
+    animated=Animated("Lines of a grating that light covers", 1.0),
 )
 _REFLECTS = Flag("reflects", False, optional=True, row=Row("Reflects", "Orders are reflected instead of transmitted."))
 
@@ -78,11 +69,9 @@ _BLAZE = Number(
         "Wavelength that order 1 gets all of: where it goes back to where it came from, or of a sheet that transmits, "
         "where it comes upright. Order m has it at the m-th part.",
         1.0,
-        1e5,
-        550.0,
-        "%.4g",
+        format="%.4g",
     ),
-    animated=Animated("Wavelength that a grating's facets send into order 1, nm", -1e5, 1e5),
+    animated=Animated("Wavelength that a grating's facets send into order 1, nm"),
 )
 _DEPTH = Number(
     "depth_nm",
@@ -93,20 +82,17 @@ _DEPTH = Number(
     row=Row(
         "Depth",
         "Depth of the grooves: it decides how light is shared out among the orders at each wavelength.",
-        0.0,
-        2000.0,
-        250.0,
-        "%.0f",
+        format="%.0f",
         is_slider=True,
     ),
-    animated=Animated("Depth of a grating's grooves, nm", 0.0, 2000.0),
+    animated=Animated("Depth of a grating's grooves, nm"),
 )
 _OPEN = Number(
     "open",
     0.5,
     above=0.0,
     at_most=1.0,
-    row=Row("Open", "Share of the grating that its slits take.", 0.0, 1.0, 0.5, "%.3g", is_slider=True),
+    row=Row("Open", "Share of the grating that its slits take.", 0.0, format="%.3g", is_slider=True),
 )
 _INDEX = Number("groove_index", 1.5, optional=True, at_least=1.01, at_most=5.0)
 _KEYS_OF = {"blazed": (_BLAZE,), "lamellar": (_DEPTH,), "sinusoidal": (_DEPTH,), "slits": (_OPEN,)}

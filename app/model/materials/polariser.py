@@ -23,7 +23,7 @@ def _share(attribute: str, default: float, label: str, which: str) -> Number:
     """A share of the light polarised in one way."""
     tip = f"Share of the light polarised {which} that passes."
     row = Row(label, tip, 0.0, 1.0, default, "%.3f", is_slider=True)
-    return Number(attribute, default, at_least=0.0, at_most=1.0, row=row, animated=Animated(tip[:-1], 0.0, 1.0))
+    return Number(attribute, default, at_least=0.0, at_most=1.0, row=row, animated=Animated(tip[:-1]))
 
 
 _RETARDANCE = Number(
@@ -39,11 +39,10 @@ _RETARDANCE = Number(
         "quarter-wave plate, where all passes across the axis too.",
         0.0,
         2000.0,
-        0.0,
-        "%.1f",
+        format="%.1f",
         is_slider=True,
     ),
-    animated=Animated("How far light across the axis falls behind, nm", -MAX_RETARDANCE_NM, MAX_RETARDANCE_NM),
+    animated=Animated("How far light across the axis falls behind, nm"),
 )
 
 

@@ -22,11 +22,9 @@ _WIDTH = Number(
         "Width",
         "Width of the slit: light of wavelength λ has its first minimum where sin θ = λ over it.",
         NARROWEST_UM,
-        1e6,
-        20.0,
-        "%.4g",
+        format="%.4g",
     ),
-    animated=Animated("Width of a slit, µm", NARROWEST_UM, 1e6),
+    animated=Animated("Width of a slit, µm", NARROWEST_UM),
 )
 
 

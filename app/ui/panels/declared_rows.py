@@ -33,12 +33,14 @@ def draw_flags(thing: T, parts: Sequence[Part]) -> T:
 def _number(thing: T, number: Number) -> T:
     row, value = number.row, getattr(thing, number.attribute)
     assert row is not None
-    high = getattr(thing, row.bounded_by) if row.bounded_by else row.high
-    shown: dict[str, Any] = {"unit": number.unit, "tip": row.tip, "format": row.format, "reset": row.reset}
+    low, high = number.span(row)
+    reset = number.default if row.reset is None else row.reset
+    shown: dict[str, Any] = {"unit": number.unit, "tip": row.tip, "format": row.format, "reset": reset}
     if row.bounded_by:
-        value, shown["reset"] = min(value, high), high
+        high = shown["reset"] = getattr(thing, row.bounded_by)
+        value = min(value, high)
     if row.is_slider:
-        new = widgets.slider(row.label, value, row.low, high, **shown)
+        new = widgets.slider(row.label, value, low, high, **shown)
     else:
-        new = widgets.drag(row.label, value, row.low, high, logarithmic=True, **shown)
+        new = widgets.drag(row.label, value, low, high, logarithmic=True, **shown)
     return thing.changed(**{number.attribute: new}) if new != value else thing
