@@ -18,7 +18,6 @@ from dataclasses import astuple, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..base.errors import UserError
 from ..model.scene import Scene
 from ..model.scene_key import picture_key
 from .code_key import code_key
@@ -67,22 +66,10 @@ class CameraRun(PartsRun):
         """`caustic_relmse`: what the caustic's noise adds to the picture's error, to be noted with it.
 
         Even and odd parts look up one half each of the caustic's photons, so that the picture's variance holds the
-        caustic's too. Raises UserError where numba is missing or solids nest beyond reach.
+        caustic's too. Raises UserError where solids nest beyond reach.
         """
-        try:
-            from . import (
-                camera_kernel,
-                camera_lights,
-                camera_scene,
-                photon_scene,
-                sampling,
-                spectral_caustic,
-                viewpoint,
-            )
-        except ImportError as error:
-            raise UserError(
-                f"the camera's reference renderer needs numba ({error}); install it with: pip install numba"
-            ) from error
+        from . import camera_kernel, camera_lights, camera_scene, photon_scene, sampling, spectral_caustic, viewpoint
+
         self._kernel, self._scratch = camera_kernel, sampling.scratch
         photons, centre = photon_scene.photon_scene(scene)
         photons = photons._replace(backwards=True)
@@ -150,7 +137,7 @@ def render_camera_reference(
     """What the camera of `scene` sees, of `samples` a pixel.
 
     `caustic` (`spectral_caustic.build_caustic`, made of the same scene) adds the light that came by glass and mirrors;
-    without it such light is missing. Raises UserError without numba or where too many solids nest.
+    without it such light is missing. Raises UserError where too many solids nest.
     """
     return continue_run(CameraRun(scene, width, height, max_depth, seed, caustic), Limits(samples))
 

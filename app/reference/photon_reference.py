@@ -69,19 +69,15 @@ class ReferenceRun(PartsRun):
     def __init__(self, scene: Scene, width: int, height: int, max_depth: int = 64, seed: int = 1) -> None:
         """Reads the scene and traces a pilot, which sets where photons start and how many each light has.
 
-        Raises UserError where numba is missing, solids nest beyond reach or the camera has a lens.
+        Raises UserError where solids nest beyond reach or the camera has a lens.
         """
         if scene.camera.lens_radius > 0.0:
             raise UserError(
                 f"the reference of the caustic layer has no lens: set lens_radius of '{scene.name}' to 0, or compare "
                 "the beauty layer"
             )
-        try:
-            from . import photon_emission, photon_kernel, photon_scene, sampling, viewpoint, worn_textures
-        except ImportError as error:
-            raise UserError(
-                f"the reference renderer needs numba ({error}); install it with: pip install numba"
-            ) from error
+        from . import photon_emission, photon_kernel, photon_scene, sampling, viewpoint, worn_textures
+
         self._kernel, self._sampling = photon_kernel, sampling
         self._scene, centre = photon_scene.photon_scene(scene)
         self._camera = viewpoint.viewpoint(scene.camera, width, height, centre)
@@ -184,7 +180,7 @@ def reference_key(scene: Scene, width: int, height: int, max_depth: int) -> str:
 def render_reference(
     scene: Scene, width: int, height: int, *, photons: int, max_depth: int = 64, seed: int = 1
 ) -> Picture:
-    """The caustic layer of `scene`, of so many photons. Raises UserError without numba or where too many solids
+    """The caustic layer of `scene`, of so many photons. Raises UserError where too many solids
     nest."""
     return continue_run(ReferenceRun(scene, width, height, max_depth, seed), Limits(photons))
 
