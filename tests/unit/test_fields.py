@@ -101,7 +101,8 @@ def test_bounds_of_the_panel_lie_within_those_of_the_file(kind: str) -> None:
     for number in light.numbers:
         row = number.row
         assert row is not None and row.label and row.tip
-        assert number.holds(row.low) and (row.bounded_by or number.holds(row.high))
+        low, high = number.span(row)
+        assert number.holds(low) and (row.bounded_by or number.holds(high))
         assert number.animated is not None
 
 
