@@ -8,7 +8,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from .facet_rays import Grid
+from .beam_worlds import Grid
 
 _MOST = 256
 

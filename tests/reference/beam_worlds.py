@@ -10,13 +10,16 @@ import numpy as np
 from spectrasplat.beams.convert import pieces_of, polygons_of
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
-from spectrasplat.beams.sources import RIM, emissions, mask_at
+from spectrasplat.beams.sources import emissions, mask_at
 from spectrasplat.model.io.scene_file import load_scene
-from spectrasplat.model.optics.colorimetry import VISIBLE_NM, rgb_basis
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
+from spectrasplat.model.optics.spectrum import Spectrum
 from spectrasplat.model.scene import Scene
-
-from .facet_rays import BLACK, GLASS, MIRROR, RECEIVER, Grid, Lamp, World
+from spectrasplat.reference.photon_emission import scene_domains
+from spectrasplat.reference.photon_kernel import land
+from spectrasplat.reference.photon_scene import photon_scene
+from spectrasplat.reference.rounds import TALLY_SIZE
+from spectrasplat.reference.sampling import scrambled, scratch
 
 FLOOR = """
 [[objects]]
@@ -37,6 +40,33 @@ def scene_of(text: str, floor_z: float | None = 0.0) -> Scene:
         path = Path(folder) / "scene.toml"
         path.write_text(text)
         return load_scene(path)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cells on a receiver: places origin + u axes[0] + v axes[1], cells of `side` from `low` on."""
+
+    receiver: int
+    """Its object."""
+    origin: np.ndarray
+    axes: np.ndarray
+    low: tuple[float, float]
+    side: float
+    shape: tuple[int, int]
+    """Along u, along v."""
+
+
+@dataclass(frozen=True)
+class Landed:
+    """What the reference's photons found, per unit of spectral power: mean and variance by cell, and of all of it."""
+
+    flux: np.ndarray
+    variance: np.ndarray
+    total: float
+    """On the receiver, inside the grid or not."""
+    total_variance: float
+    weight: float
+    """Of a photon that landed, by mean square over mean."""
 
 
 @dataclass
@@ -86,66 +116,6 @@ class Rig:
         leaves, sums = self.find(emission, threshold, seed, depth)
         return pieces_of(leaves, self.beams, 0, 1.0), sums
 
-    def world(self, x: float) -> World:
-        """Its triangles at one spectral coordinate."""
-        nm = float(self.axis.nm_of_x(x))
-        objects = self.scene.objects
-        count = len(objects)
-        glass = sorted(
-            (i for i, o in enumerate(objects) if o.material.transmits), key=lambda i: (objects[i].material.priority, i)
-        )
-        rank = np.full(count, -1, np.int64)
-        rank[glass] = np.arange(len(glass))
-        kind, index, absorption, rho = np.zeros(count, np.int64), np.ones(count), np.zeros(count), np.zeros(count)
-        for i, item in enumerate(objects):
-            material = item.material
-            if material.transmits:
-                kind[i], index[i] = GLASS, float(material.dispersion.index(np.array([nm]))[0])
-                if material.absorption is not None:
-                    absorption[i] = np.interp(nm, VISIBLE_NM, material.absorption.coefficient)
-            elif material.is_mirror:
-                kind[i] = MIRROR
-                rho[i] = np.interp(nm, VISIBLE_NM, rgb_basis() @ np.asarray(material.reflectance_rgb, float))
-            else:
-                kind[i] = RECEIVER if material.receives else BLACK
-        corners = np.concatenate([mesh.corners() for mesh in self.meshes])
-        owner = np.concatenate([np.full(len(mesh.triangles), i) for i, mesh in enumerate(self.meshes)])
-        return World(corners, owner.astype(np.int64), kind, rank, index, absorption, rho)
-
-    def lamp(self, light: int = 0) -> Lamp:
-        """A light as rays: all that may meet glass or a mirror. A round parallel light has the aperture that beams
-        have: what else is between the circle and that polygon, tests/unit/test_beam_sources.py bounds."""
-        it = self.scene.lights[light]
-        right, up, forward = it.axes().T
-        special = [i for i, o in enumerate(self.scene.objects) if o.material.is_specular]
-        corners = np.concatenate([self.meshes[i].vertices for i in special])
-        if it.is_parallel and it.has_place:
-            rim = RIM if it.is_disc else 0
-            return Lamp(np.array(it.position), forward, right, up, it.half_extent, it.is_disc, corners=rim)
-        if it.is_parallel:
-            middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-            tangent = np.tan(it.angular_radius)
-            reach = np.linalg.norm(corners - middle, axis=1).max() * (1.0 + tangent) * 1.01
-            back = 3.0 * reach
-            half = reach + back * tangent
-            return Lamp(middle - back * forward, forward, right, up, (half, half), False, tangent)
-        place, half = np.array(it.position), it.half_extent
-        if it.has_outline:
-            return Lamp(place, forward, right, up, half, it.is_disc, 0.0, True, axis=forward, lambert=True)
-        towards = corners.mean(axis=0) - place
-        towards /= np.linalg.norm(towards)
-        side = np.cross(towards, np.eye(3)[np.argmin(np.abs(towards))])
-        side /= np.linalg.norm(side)
-        other = np.cross(towards, side)
-        depth = (corners - place) @ towards
-        window = (0.0, 0.0, 0.0, 0.0)
-        if depth.min() > 0.0:
-            flat = np.stack([(corners - place) @ side, (corners - place) @ other]) / depth
-            low, high = flat.min(axis=1), flat.max(axis=1)
-            if np.abs(flat).max() < 3.0:
-                window = (low[0], high[0], low[1], high[1])
-        return Lamp(place, towards, side, other, (0.0, 0.0), False, 0.0, True, window, forward, it.cone)
-
     def grid(self, low: tuple[float, float], high: tuple[float, float], cells: int, receiver: int = 0) -> Grid:
         """Square cells, `cells` along u, from `low` to about `high`."""
         side = (high[0] - low[0]) / cells
@@ -153,6 +123,32 @@ class Rig:
         return Grid(
             self.receivers[receiver], origin, axes, low, side, (cells, max(1, round((high[1] - low[1]) / side)))
         )
+
+
+def landed(rig: Rig, x: float, grid: Grid, photons: int) -> Landed:
+    """Photons of one spectral coordinate by the float64 reference (exact triangles, Fresnel by chance), which shares no
+    code with beams: those that land on the grid's receiver, from above, by glass or mirrors."""
+    line = Spectrum(np.zeros(401), ((float(rig.axis.nm_of_x(x)), 1.0),))
+    scene = replace(rig.scene, lights=tuple(replace(light, spectral_power=line) for light in rig.scene.lights))
+    traced, centre = photon_scene(scene)
+    domains, colours = scene_domains(scene, traced, centre)
+    side = np.full((len(scene.objects), 2), -1, np.int32)
+    side[grid.receiver, 0] = 0
+    count = photons // len(domains)
+    points, watts, ends = np.empty((count, 3)), np.empty(count), np.empty((count, 4), np.int32)
+    sums, squares, total = np.zeros(grid.shape), np.zeros(grid.shape), np.zeros(2)
+    for number, (domain, colour) in enumerate(zip(domains, colours, strict=True)):
+        one, start = np.zeros(len(colour.start_nm), np.int32), (scrambled(1, 0, number), 0, count, 1.0 / count)
+        found = land(
+            traced, domain, colour, one, side, *start, 64, np.zeros(TALLY_SIZE), points, watts, ends, scratch()
+        )
+        each = watts[:found]
+        total += each.sum(), (each**2).sum()
+        at = ((points[:found] + centre - grid.origin) @ grid.axes.T - grid.low) / grid.side
+        cells = [np.arange(n + 1) for n in grid.shape]
+        sums += np.histogramdd(at, cells, weights=each)[0]
+        squares += np.histogramdd(at, cells, weights=each**2)[0]
+    return Landed(sums, squares - sums**2 / photons, total[0], total[1] - total[0] ** 2 / photons, total[1] / total[0])
 
 
 def at_index(emission: Emission, *x: float) -> Emission:

@@ -1,8 +1,8 @@
 """Beams against rays by chance: what polygons of one index hold, cell by cell and in all.
 
-The tracer (`reference.facet_rays`) shares no code with the search. With N rays landed, a missing or doubled share of
-all light of 5 / sqrt(N) is detected, and in a cell of n rays one of 5 / sqrt(n): quick, 4e5 rays sent, about 1.5 % of
-all light and 16 % of a cell of 1,000; slow, 1e8 rays, 0.1 % and 1 %.
+The rays are the float64 reference's photons, which share no code with the search. With N of them landed, a missing or
+doubled share of all light of 5 / sqrt(N) is detected, and in a cell of n one of 5 / sqrt(n): with 4e5 photons sent,
+about 1.5 % of all light and 16 % of a cell of 1,000.
 """
 
 from __future__ import annotations
@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from reference.beam_scenes import BRILLIANT, CASES, EXTREMES, NEAR, SUN, step_cut
 from reference.beam_sums import cells
-from reference.beam_worlds import Rig, at_index, grid_about, scene_of, scores
-from reference.facet_rays import landed
+from reference.beam_worlds import Rig, at_index, grid_about, landed, scene_of, scores
 from spectrasplat.beams.facets import convex_hull
 from spectrasplat.beams.polygons import joined
 from spectrasplat.beams.search import SUM_DEPOSITED, SUM_ENTERED, SUM_NUMERIC, SUM_ROULETTE
@@ -22,9 +21,9 @@ CELL_SCORE, TOTAL_SCORE = 5.0, 4.5
 POINT_BALANCE = 0.02
 
 
-def found_by_beams(rig: Rig, threshold: float):
+def found_by_beams(rig: Rig, threshold: float, x: float = X):
     """All polygons of a lamp at one index."""
-    return joined([rig.polygons(at_index(emission, X), threshold)[0] for emission in rig.emissions()])
+    return joined([rig.polygons(at_index(emission, x), threshold)[0] for emission in rig.emissions()])
 
 
 def compare(text: str, rays: int, threshold: float, texel: float, side: int = 40) -> tuple[float, np.ndarray]:
@@ -35,7 +34,7 @@ def compare(text: str, rays: int, threshold: float, texel: float, side: int = 40
     exact, outside, each = cells(polygons, 0, grid, from_hulls=True)
     # A faint piece of a cone's rim holds what its slope says, not what its middle does.
     assert each.sum() == pytest.approx(polygons.flux.sum(), rel=1e-4)
-    rays_found = landed(rig.world(X), rig.lamp(), grid, rays)
+    rays_found = landed(rig, X, grid, rays)
     total = (rays_found.total - exact.sum() - outside) / np.sqrt(rays_found.total_variance)
     return total, scores(rays_found.flux, exact, rays_found.variance, rays_found.weight, 50.0)
 
@@ -61,10 +60,22 @@ def test_polygons_of_points_hold_what_rays_find(name: str) -> None:
     assert agree(total, by_cell), (total, by_cell)
 
 
-@pytest.mark.parametrize("name", EXTREMES)
+@pytest.mark.parametrize("name", [name for name in EXTREMES if name != "same"])
 def test_polygons_of_extremes_hold_what_rays_find(name: str) -> None:
     total, by_cell = compare(EXTREMES[name], 400_000, 1e-7, 1e-3, 24)
     assert agree(total, by_cell), (total, by_cell)
+
+
+def test_of_two_solids_in_one_place_the_later_counts() -> None:
+    """To rounding: photons would meet one face after the other."""
+    lamp, one, other = EXTREMES["same"].split("[[objects]]")
+    both, later = (Rig(scene_of("[[objects]]".join(parts))) for parts in ((lamp, one, other), (lamp, other)))
+    nm = both.axis.nm_of_x(X)
+    polygons = [found_by_beams(rig, 1e-7, float(rig.axis.x_of_nm(nm))) for rig in (both, later)]
+    grid = grid_about(later, polygons[1], 24)
+    found, alone = (cells(each, 0, grid)[0] for each in polygons)
+    assert alone.sum() > 0.1
+    np.testing.assert_allclose(found, alone, rtol=0.0, atol=1e-6 * alone.max())
 
 
 @pytest.mark.parametrize("name", {**CASES, **EXTREMES})
