@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...edit.presets import light_presets
 from ...features.facts import dispersive_glasses
 from ...features.features import Features
 from ...model.optics import catalogue
@@ -25,18 +26,15 @@ _APART = 0.02
 """Least relative difference of two glasses' V_d."""
 _FIRST_NM = 400.0
 """Fits that begin later say too little of violet light."""
-_SODIUM = Spectrum(lines=((588.995, 2.0), (589.592, 1.0)))
-_MERCURY = Spectrum(
-    lines=((404.656, 0.42), (407.783, 0.06), (435.833, 0.73), (546.074, 1.0), (576.960, 0.25), (579.066, 0.27))
-)
-"""The visible lines of a low-pressure lamp, relative."""
+_LAMPS = ("Sodium lamp", "Mercury lamp")
 
 
 def offered_spectra() -> dict[str, Spectrum]:
     """Spectra that a reader may choose, relative, by name."""
     standard = {"Daylight (D65)": "D65", "Incandescent (A)": "A", "White LED": "LED-B3"}
     found = {title: illuminant(name) for title, name in standard.items()}
-    return found | {"Sodium lamp": _SODIUM, "Mercury lamp": _MERCURY}
+    lamps = {preset.name: preset.value for preset in light_presets()}
+    return found | {name: Spectrum(lines=lamps[name]) for name in _LAMPS}  # type: ignore[arg-type]  # they have lines
 
 
 @dataclass(frozen=True)
