@@ -71,7 +71,7 @@ class SpectrumFeatures:
         "band cuts",
         lambda facts: facts.groups > 0,
         symbol="BAND_CUTS",
-        why="total internal reflection may cut a band",
+        why="total internal reflection, or a border, may cut a band",
         why_not="no band to cut",
         names=(
             "part_of_band",
@@ -81,24 +81,12 @@ class SpectrumFeatures:
             "FELL_BAND",
             "is_cut",
             "energy_below",
+            "meet_with_band",
         ),
-        cost="one program more; a cut ray becomes two",
+        cost="one program more, two rays more a landing or escape; a cut ray becomes two",
         requires=("spectral_groups",),
     )
-    """Total internal reflection may cut a band."""
-    landing_cuts: bool = feature(
-        "landing cuts",
-        lambda facts: (
-            facts.groups > 0 and facts.has_columns and len(facts.having(lambda material: not material.is_specular)) > 1
-        ),
-        symbol="LANDING_CUTS",
-        why="a band may land on several surfaces",
-        why_not="there is one surface to land on",
-        names=("meet_with_band", "lands_broadly"),
-        cost="two rays more a landing; a cut ray becomes two",
-        requires=("band_cuts",),
-    )
-    """Some wavelengths of a band may meet another surface than its anchor does."""
+    """Total internal reflection may cut a band, or a border that parts what its wavelengths meet."""
     reindexed: bool = feature(
         "photons by index",
         lambda facts: facts.is_reindexed,

@@ -413,11 +413,7 @@ def trace_parameters(objects: int = 0) -> Struct:
             Field("widest_turn", "float", "of a footprint's directions behind a surface, rad a side"),
             Field("paths", "float", "of the pass, over all of its sub-lattices: each has microfacets of its own"),
             Field("widest_sweep", "float", "of a ray's directions over its band, rad"),
-            Field(
-                "bounded",
-                "uint",
-                "0: a lamp's and a lobe's columns are wanted as derivatives, whatever is believed of them",
-            ),
+            Field("narrowest_landing", "float", "band that is cut where it meets two surfaces, or one and none"),
             Field("tint_halfway", "vec4", "odds for the next level, of a way in the middle between both", LEVELS // 4),
             Field(
                 "beam_objects",

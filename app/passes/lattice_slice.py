@@ -52,8 +52,9 @@ class LatticeSlice:
     """Points of the lattice, in a row, whose light each of this slice has."""
     row: tuple[float, float] = (0.0, 0.0)
     """Along it, as long as the standard deviation of their places over that of a footprint."""
-    keeps_sweeps: bool = False
-    """Spectral columns are wanted as derivatives, whatever is believed of them where light is drawn."""
+    keeps_bands: bool = False
+    """Bands stay whole past borders, and their columns are wanted as derivatives, whatever is believed of them where
+    light is drawn."""
 
     @property
     def lattices(self) -> int:

@@ -128,7 +128,7 @@ def pilot_steps(
             fullness = max(fullness, batch.fullness)
 
         piece = LatticeSlice(
-            light, (band,), count, 0, 1, count, (0, 0), (0, 0), 0, 1, light_place=place, keeps_sweeps=True
+            light, (band,), count, 0, 1, count, (0, 0), (0, 0), 0, 1, light_place=place, keeps_bands=True
         )
         for i in range(slices):
             part = piece.every(every, 0).every(slices, i), domain

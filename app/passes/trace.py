@@ -132,6 +132,8 @@ CARRIED_ON_POINTS = 2e4
 WIDEST_SWEEP = 0.5
 """How far a ray's direction may change over its band, radians, for its spectral columns to be believed: without a bound
 some light misses all maps."""
+NARROWEST_LANDING = 1 / 128
+"""Part of the spectrum: a narrower band is not cut where its wavelengths meet different surfaces."""
 WIDEST_ON_SURFACE = 0.06
 """As a share of an object's size (half of its bounds' diagonal): the longest side of a footprint on it, and of what a
 lamp's other points add, where the lattice's own spacing is not longer."""
@@ -420,8 +422,8 @@ class TracePass:
             p["lattice_bits"] = piece.lattice_count << records.LATTICE_BIT
         paths = piece.lattice_count * piece.lattices * domain.active_share
         p["paths"], p["widest_turn"] = paths, self._widest_turn(paths)
-        if piece.keeps_sweeps:
-            p["widest_sweep"] = UNBOUNDED
+        if piece.keeps_bands:
+            p["widest_sweep"] = p["narrowest_landing"] = UNBOUNDED
         p["lattice_shift"] = piece.shift[1]
         p["surface_key"] = p["tint_key"] = piece.seed
         p["lattices_together"] = 1 if self._features.spectral_groups else len(piece.bands)
@@ -445,8 +447,9 @@ class TracePass:
         p["max_depth"], p["split_threshold"], p["lattices"] = max_depth, split_threshold, 1
         p["lattices_together"], p["widest_on_surface"] = 1, self.widest_on_surface
         p["paths"], p["widest_turn"] = CARRIED_ON_POINTS, self._widest_turn(CARRIED_ON_POINTS)
-        p["bounded"] = self.widest_on_surface < UNBOUNDED
-        p["widest_sweep"] = WIDEST_SWEEP if p["bounded"] else UNBOUNDED
+        is_bounded = self.widest_on_surface < UNBOUNDED
+        p["widest_sweep"] = WIDEST_SWEEP if is_bounded else UNBOUNDED
+        p["narrowest_landing"] = NARROWEST_LANDING if is_bounded else UNBOUNDED
         p["power_row"] = self.scene.layout.power_row + light * max(1, self._features.tint_levels)
         p["tint_row"] = self.scene.tint_row
         if self.scene.tint_levels is not None:

@@ -233,8 +233,8 @@ uint arrive(uint slot, out Arrival at, out Outcome outcome) {
     if (!POINT_SPECTRUM) band_w = band_powers(power_row(path), path.band);
 
     float border = -1.0;
-    bool met = LANDING_CUTS ? meet_with_band(path, hit, border)
-                            : intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
+    bool met = BAND_CUTS ? meet_with_band(path, hit, border)
+                         : intersect_closest(path.position, path.direction, FAR_DISTANCE, path.origin, hit);
     if (LOOPS_MAY_END) {
         // llvmpipe ends every loop of an invocation once they have run 65,535 rounds together, and goes on with what
         // there is.
@@ -254,8 +254,8 @@ uint arrive(uint slot, out Arrival at, out Outcome outcome) {
     if (ABSORPTION && met) absorb(path, hit.distance, outcome.absorbed_w);
     if (met) path.position = surface_point(hit, facet, path.position, path.direction);
     if (FOOTPRINTS && path.depth > 0u) keep_directions_within(path);
-    if (LAMP_COLUMNS && met && path.depth > 0u && p.bounded != 0u) keep_pair_above(path, LAMP, hit.normal_g);
-    if (LOBE_COLUMNS && met && p.bounded != 0u) keep_pair_above(path, LOBE, hit.normal_g);
+    if (LAMP_COLUMNS && met && path.depth > 0u && ARE_BOUNDED) keep_pair_above(path, LAMP, hit.normal_g);
+    if (LOBE_COLUMNS && met && ARE_BOUNDED) keep_pair_above(path, LOBE, hit.normal_g);
     transfer_columns(path, hit.normal_g, hit.distance);
     if (FOOTPRINTS && (IS_GLASS(kind) || kind == KIND_MIRROR))
         keep_columns_within(path, start, thing.colour.z, hit.distance);

@@ -64,6 +64,8 @@ void keep_directions_within(inout Path path) {
 #define FORGOTTEN 0.5
 // Of a ray's elevation over what it meets.
 #define HIGHEST_RISE 0.5
+// Whether no columns are wanted as derivatives, whatever is believed of them.
+#define ARE_BOUNDED (p.widest_turn < 1e29)
 
 // Of columns `c` and `c + 1` of a ray that meets a surface with this normal: how a lamp's places and microfacets turn
 // light grows with every surface, and at grazing exits without bound. And up and down they say no more than half of the

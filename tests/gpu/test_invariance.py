@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spectrasplat.features.features import Features
+from spectrasplat.gpu.scene_buffers import UNBOUNDED
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import CollimatedLight, SpotLight
@@ -30,6 +30,7 @@ from spectrasplat.model.scene import (
     SceneObject,
 )
 from spectrasplat.model.settings import RenderSettings
+from spectrasplat.passes import trace
 from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.gpu_paths import extruded, glass
 
@@ -305,8 +306,8 @@ material = { kind = "grating", orders = [1], efficiency = 1 }
 """
 
 
-def over_strips(folder: Path, thing: str, *borders: float) -> Scene:
-    """A `thing` over a floor that is one object between any two `borders`."""
+def over_strips(folder: Path, thing: str, *borders: float, end: float = 6.0, beyond: str = "") -> Scene:
+    """A `thing` over a floor that is one object between any two `borders`, up to `end`."""
     strips = [
         f"""
 [[objects]]
@@ -316,10 +317,10 @@ vertices = [[{lo}, -6.0, 0.0], [{hi}, -6.0, 0.0], [{hi}, 6.0, 0.0], [{lo}, 6.0, 
 triangles = [[0, 1, 2], [0, 2, 3]]
 material = "diffuse"
 """
-        for i, (lo, hi) in enumerate(pairwise((-6.0, *borders, 6.0)))
+        for i, (lo, hi) in enumerate(pairwise((-6.0, *borders, end)))
     ]
     file = folder / f"{len(borders)}.toml"
-    file.write_text(LAMP + thing + "".join(strips))
+    file.write_text(LAMP + thing + "".join(strips) + beyond)
     return load_scene(file)
 
 
@@ -330,10 +331,27 @@ def test_a_floor_may_be_several_objects(gl, tmp_path: Path, thing: str, monkeypa
     strips = 0.8, 0.95, 1.1, 1.25
     whole = picture(gl, over_strips(tmp_path, thing)).sum(axis=(0, 1))
     np.testing.assert_allclose(picture(gl, over_strips(tmp_path, thing, *strips)).sum(axis=(0, 1)), whole, rtol=0.012)
-    of = Features.of
-    monkeypatch.setattr(Features, "of", staticmethod(lambda *asked: replace(of(*asked), landing_cuts=False)))
+    monkeypatch.setattr(trace, "NARROWEST_LANDING", UNBOUNDED)
     uncut = picture(gl, over_strips(tmp_path, thing, *strips)).sum(axis=(0, 1))
     assert np.abs(uncut / whole - 1.0).max() > 0.018
+
+
+BLACK = """
+[[objects]]
+shape = "inline"
+vertices = [[3.0, -6.0, 0.0], [6.0, -6.0, 0.0], [6.0, 6.0, 0.0], [3.0, 6.0, 0.0]]
+triangles = [[0, 1, 2], [0, 2, 3]]
+material = "black"
+"""
+
+
+def test_a_floor_may_end(gl, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It gets what of a band lands on it, though the band's anchor goes past: as if it went on in black."""
+    ending = over_strips(tmp_path, GRATING, end=3.0)
+    goes_on = picture(gl, over_strips(tmp_path, GRATING, end=3.0, beyond=BLACK)).sum(axis=(0, 1))
+    np.testing.assert_allclose(picture(gl, ending).sum(axis=(0, 1)), goes_on, rtol=2e-3)
+    monkeypatch.setattr(trace, "NARROWEST_LANDING", UNBOUNDED)
+    assert (np.abs(picture(gl, ending).sum(axis=(0, 1))[:2] / goes_on[:2] - 1.0) > 0.05).all()
 
 
 @pytest.mark.slow

@@ -55,7 +55,6 @@ def scene_of(tmp_path: Path, name: str) -> Scene:
                 "spectral maps",
                 "spectral columns",
                 "band cuts",
-                "landing cuts",
                 "absorption",
                 "medium stack",
                 "mirrors",

@@ -161,7 +161,6 @@ SHIPPED = {
         "spectral maps",
         "spectral columns",
         "band cuts",
-        "landing cuts",
         "absorption",
         "medium stack",
         "spectral bins",
