@@ -76,6 +76,12 @@ require_opengl() {
         fail "OpenGL 4.3 is missing: run 'sudo apt-get install $gl_packages' and try again ('./run doctor' tells more)"
 }
 
+# One test draws through OSMesa and is skipped without it; newer distributions have dropped it.
+offer_osmesa() {
+    "$venv_python" -c 'import ctypes; ctypes.CDLL("libOSMesa.so.8")' >/dev/null 2>&1 ||
+        apt_install libosmesa6 || true
+}
+
 # The viewer's window is tested on a virtual screen.
 offer_xvfb() {
     { command -v xvfb-run && command -v Xvfb && command -v xauth; } >/dev/null 2>&1 || apt_install xvfb xauth || true
@@ -125,7 +131,7 @@ set_up() {
             make_venv
         fi
         install_packages "$extras"
-        [ -z "$extras" ] || offer_xvfb
+        [ -z "$extras" ] || { offer_osmesa; offer_xvfb; }
         warm_caches
         printf '%s' "$key" >"$stamp"
     fi

@@ -61,7 +61,7 @@ def doctor(options: Doctor) -> int:
 
 def examine() -> list[Check]:
     """Every check, in the order in which to mend things."""
-    return [_python(), *_packages(), *_modules(), *_opengl(), _display(), _cache(), _data()]
+    return [_python(), *_packages(), *_modules(), *_opengl(), _osmesa(), _display(), _cache(), _data()]
 
 
 def report(checks: list[Check]) -> str:
@@ -151,7 +151,7 @@ def _opengl() -> Iterator[Check]:
         yield Check("OpenGL", found, "missing", remedy or found)
         return
     kind = "software renderer: slow but right" if context.is_software else "GPU"
-    yield Check("OpenGL", f"{context.version} through EGL", "ok")
+    yield Check("OpenGL", f"{context.version} through {context.backend.upper()}", "ok")
     yield Check("renderer", f"{context.renderer} ({kind})", "ok")
     yield Check("vendor", context.vendor, "ok")
     yield Check("splats", context.splats.sentence, "ok")
@@ -181,6 +181,16 @@ def _limits(limits: Limits) -> Iterator[Check]:
             "optional",
             "update the graphics driver to brush dispersion onto glass",
         )
+
+
+def _osmesa() -> Check:
+    from ..gpu.osmesa import load_library
+
+    try:
+        load_library()
+    except OSError:
+        return Check("OSMesa", "not installed (only a second way to the software renderer)", "optional")
+    return Check("OSMesa", "installed", "ok")
 
 
 def _display() -> Check:

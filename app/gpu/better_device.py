@@ -20,6 +20,7 @@ _FORCING = {
     "LIBGL_ALWAYS_SOFTWARE": ("1", "true", "yes"),
     "GALLIUM_DRIVER": ("llvmpipe", "softpipe", "swr"),
     "MESA_LOADER_DRIVER_OVERRIDE": ("swrast", "kms_swrast", "llvmpipe"),
+    "SPECTRASPLAT_BACKEND": ("osmesa",),
 }
 """Variables, and values of theirs, that force a software renderer."""
 _VENDOR_FOLDERS = ("usr/share/glvnd/egl_vendor.d", "etc/glvnd/egl_vendor.d")

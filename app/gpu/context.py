@@ -1,6 +1,7 @@
 """One OpenGL 4.3 core context without a window, and its failures in plain words.
 
-It comes from EGL, which every GPU driver and llvmpipe have, on each device in turn.
+EGL is tried first (every GPU driver and llvmpipe have it), on each device in turn, then
+OSMesa. `SPECTRASPLAT_BACKEND=egl` or `=osmesa` chooses one and forbids the other.
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ import os
 import sys
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Literal, Self
 
-from ..base.errors import DeviceError, OwnCallError, UserError, own_fault
+from ..base.errors import DeviceError, OwnCallError, UserError, own_fault, suggestion
 from .better_device import advice
 from .device_traits import DeviceTraits, is_software_renderer
 from .limits import Limits
@@ -24,10 +25,15 @@ if TYPE_CHECKING:
 
     from .pass_timers import PassTimers
 
+Backend = Literal["egl", "osmesa", "window"]
+"""How a context was made; a window brings its own."""
+BACKENDS: tuple[Backend, ...] = ("egl", "osmesa")
+ENVIRONMENT_VARIABLE = "SPECTRASPLAT_BACKEND"
 GL_VERSION = (4, 3)
 GL_VERSION_CODE = 100 * GL_VERSION[0] + 10 * GL_VERSION[1]
 
 APT_LINE = "apt-get install libegl1 libgl1 libgl1-mesa-dri"
+APT_LINE_OSMESA = "apt-get install libosmesa6"
 _MAX_EGL_DEVICES = 16
 
 
@@ -51,10 +57,14 @@ def check_device(ctx: moderngl.Context, where: str) -> None:
 
 
 class Context:
-    """A current moderngl context, `ctx`, with what the passes need to know of it."""
+    """A current moderngl context with what the passes need to know of it.
 
-    def __init__(self, ctx: moderngl.Context) -> None:
+    `ctx` is the `moderngl.Context`; `backend` says how it was made.
+    """
+
+    def __init__(self, ctx: moderngl.Context, backend: Backend) -> None:
         self.ctx = ctx
+        self.backend = backend
         info = ctx.info
         self.renderer: str = info["GL_RENDERER"]
         self.vendor: str = info["GL_VENDOR"]
@@ -101,8 +111,8 @@ class Context:
         self.release()
 
 
-def create_context() -> Context:
-    """A current OpenGL 4.3 core context without a window.
+def create_context(backend: Backend | None = None) -> Context:
+    """A current OpenGL 4.3 core context, by `backend`, else the environment, else the first that works.
 
     Raises `UserError` with the exact remedy when there is none.
     """
@@ -111,6 +121,33 @@ def create_context() -> Context:
             "macOS stops at OpenGL 4.1 and compute shaders need 4.3, "
             "so run SpectraSplat on Linux (a virtual machine or a container will do)"
         )
+    chosen = backend or _from_environment()
+    if chosen == "osmesa":
+        return _create_osmesa()
+    try:
+        return _create_egl()
+    except UserError:
+        if chosen == "egl":
+            raise
+        try:
+            return _create_osmesa()
+        except UserError:
+            pass  # EGL is the ordinary way: its remedy is the one to give
+        raise
+
+
+def _from_environment() -> Backend | None:
+    name = os.environ.get(ENVIRONMENT_VARIABLE, "").strip().casefold()
+    if not name:
+        return None
+    for backend in BACKENDS:
+        if name == backend:
+            return backend
+    hint = suggestion(name, BACKENDS) or ", use 'egl' or 'osmesa'"
+    raise UserError(f"{ENVIRONMENT_VARIABLE} is '{name}', which is no known backend{hint}")
+
+
+def _create_egl() -> Context:
     import glcontext
 
     egl = _first_loadable(("libEGL.so.1", "libEGL.so"))
@@ -132,8 +169,20 @@ def create_context() -> Context:
             if "GLCONTEXT_DEVICE_INDEX" in os.environ:  # the user's choice overrides ours
                 break
             continue
-        return Context(ctx)
+        return Context(ctx, "egl")
     raise UserError(_explain_egl(problem))
+
+
+def _create_osmesa() -> Context:
+    from .osmesa import OSMesaLoader
+
+    try:
+        loader = OSMesaLoader(*GL_VERSION)
+    except OSError as error:
+        raise UserError(
+            f"OpenGL through OSMesa failed ({error}): run '{APT_LINE_OSMESA}' as root, or use EGL"
+        ) from error
+    return Context(adopting_context(loader, GL_VERSION_CODE, standalone=True), "osmesa")
 
 
 def _explain_egl(problem: str) -> str:

@@ -73,7 +73,7 @@ class Window:
         place = place or WindowPlace()
         self._handle = _create(place, visible)
         glfw.make_context_current(self._handle)
-        self.context = Context(adopting_context(GlfwLoader(), GL_VERSION_CODE))
+        self.context = Context(adopting_context(GlfwLoader(), GL_VERSION_CODE), "window")
         # A GPU waits for the screen; on the processor waiting would be time taken from the photons.
         glfw.swap_interval(0 if self.context.is_software else 1)
         self._screen = self.context.ctx.detect_framebuffer(0)
@@ -410,7 +410,7 @@ def _beside(window: Any) -> Any | None:
 def _entered(hidden: Any) -> Context:
     """The context of a hidden window, made current on the thread that asks."""
     glfw.make_context_current(hidden)
-    return Context(adopting_context(GlfwLoader(), GL_VERSION_CODE, unlocked=True))
+    return Context(adopting_context(GlfwLoader(), GL_VERSION_CODE, unlocked=True), "window")
 
 
 def _shrink_to_screen(handle: Any) -> None:

@@ -1,8 +1,11 @@
-"""The OpenGL context: what it tells, and how it fails."""
+"""The OpenGL context: what it tells, how it fails, and that OSMesa runs a compute shader."""
 
 from __future__ import annotations
 
+import os
+import subprocess
 import sys
+from pathlib import Path
 
 import glcontext
 import numpy as np
@@ -18,6 +21,22 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 0) buffer Values { float value[]; };
 void main() { value[gl_GlobalInvocationID.x] *= 2.0; }
 """
+
+OSMESA_SMOKE = f'''
+import numpy as np
+from spectrasplat.gpu.context import create_context
+with create_context() as gl:
+    values = gl.ctx.buffer(np.arange(256, dtype="f4").tobytes())
+    values.bind_to_storage_buffer(0)
+    gl.ctx.compute_shader("""{DOUBLE.strip()}""").run(4)
+    gl.finish()
+    gl.check("smoke")
+    assert np.array_equal(np.frombuffer(values.read(), "f4"), 2.0 * np.arange(256, dtype="f4"))
+    target = gl.ctx.texture((4, 4), 4, dtype="f4")
+    gl.ctx.framebuffer([target]).clear(0.25, 0.5, 0.75, 1.0)
+    assert np.allclose(np.frombuffer(target.read(), "f4").reshape(-1, 4), [0.25, 0.5, 0.75, 1.0])
+    print(gl.backend, gl.is_software)
+'''
 
 
 def test_context_tells_version_and_limits(gl: Context) -> None:
@@ -59,7 +78,7 @@ def test_software_renderers_are_recognised(renderer: str, software: bool) -> Non
         extensions: frozenset[str] = frozenset()
         error = "GL_NO_ERROR"
 
-    assert Context(Fake()).is_software is software  # type: ignore[arg-type]
+    assert Context(Fake(), "egl").is_software is software  # type: ignore[arg-type]
 
 
 def test_a_limit_the_driver_does_not_tell_counts_as_zero() -> None:
@@ -69,13 +88,31 @@ def test_a_limit_the_driver_does_not_tell_counts_as_zero() -> None:
     assert limits.work_group_count == (0, 0, 0)
 
 
+def test_osmesa_smoke() -> None:
+    # In a process of its own: two libraries' current contexts would fight over one thread.
+    if context_module._first_loadable(("libOSMesa.so.8", "libOSMesa.so.6")) is None:
+        pytest.skip("libOSMesa is not installed here (Mesa dropped it with 25.1)")
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run(
+        [sys.executable, "-c", OSMESA_SMOKE],
+        cwd=root,
+        env={**os.environ, "SPECTRASPLAT_BACKEND": "osmesa"},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["osmesa", "True"]
+
+
 class TestFailures:
     """Each way OpenGL can be missing ends in one sentence with the remedy."""
 
     def test_library_missing(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(context_module, "_first_loadable", lambda names: None)
         with pytest.raises(UserError, match="libEGL.so.1 is not installed.*libgl1-mesa-dri"):
-            create_context()
+            create_context("egl")
 
     @pytest.mark.parametrize(
         ("raw", "told"),
@@ -96,10 +133,39 @@ class TestFailures:
 
         monkeypatch.setattr(glcontext, "get_backend_by_name", lambda _name: refuse)
         with pytest.raises(UserError, match=told) as caught:
-            create_context()
+            create_context("egl")
         assert tried == [0, 1, 2]  # every device had its chance
         assert raw in str(caught.value)
         assert "apt-get install libegl1 libgl1 libgl1-mesa-dri" in str(caught.value)
+
+    def test_falls_back_to_osmesa_only_when_free_to(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        def no_egl() -> Context:
+            raise UserError("no EGL")
+
+        sentinel = object()
+        monkeypatch.delenv("SPECTRASPLAT_BACKEND", raising=False)
+        monkeypatch.setattr(context_module, "_create_egl", no_egl)
+        monkeypatch.setattr(context_module, "_create_osmesa", lambda: sentinel)
+        assert create_context() is sentinel
+        with pytest.raises(UserError, match="no EGL"):
+            create_context("egl")
+        monkeypatch.setenv("SPECTRASPLAT_BACKEND", "egl")
+        with pytest.raises(UserError, match="no EGL"):
+            create_context()
+
+    def test_both_fail_gives_the_remedy_of_egl(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.delenv("SPECTRASPLAT_BACKEND", raising=False)
+        monkeypatch.setattr(context_module, "_first_loadable", lambda names: None)
+        monkeypatch.setattr("spectrasplat.gpu.osmesa.load_library", lambda: (_ for _ in ()).throw(OSError("not there")))
+        with pytest.raises(UserError, match="libegl1 libgl1 libgl1-mesa-dri"):
+            create_context()
+        with pytest.raises(UserError, match=r"OSMesa failed \(not there\).*libosmesa6"):
+            create_context("osmesa")
+
+    def test_unknown_backend_in_the_environment(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("SPECTRASPLAT_BACKEND", "osmessa")
+        with pytest.raises(UserError, match="SPECTRASPLAT_BACKEND is 'osmessa'.*'osmesa'"):
+            create_context()
 
     def test_macos_is_told_why(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(sys, "platform", "darwin")

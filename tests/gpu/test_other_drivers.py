@@ -18,7 +18,7 @@ from spectrasplat.base.paths import shipped_scenes
 
 APT_LINE = "apt-get install mesa-vulkan-drivers libegl1 libgl1-mesa-dri"
 ICD_FOLDERS = ("/usr/share/vulkan/icd.d", "/usr/local/share/vulkan/icd.d", "/etc/vulkan/icd.d")
-NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY", "PYTEST_CURRENT_TEST")
+NO_DISPLAY = ("DISPLAY", "WAYLAND_DISPLAY", "SPECTRASPLAT_BACKEND", "PYTEST_CURRENT_TEST")
 DIFFERENT = 6e-3
 """Root mean square difference of two drivers' pictures over the root mean square: sums in another order, and where a
 choice hangs on the last bit, another path: single photons, so that it falls with their number (ripples: 8e-3 with

@@ -185,6 +185,6 @@ def test_the_callers_own_context_stays_current_and_whole() -> None:
 
 
 def test_a_device_that_fails_is_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("SPECTRASPLAT_DEVICE", "vulkan")
-    with pytest.raises(ss.UserError, match="SPECTRASPLAT_DEVICE is 'vulkan'"):
+    monkeypatch.setenv("SPECTRASPLAT_BACKEND", "vulkan")
+    with pytest.raises(ss.UserError, match="SPECTRASPLAT_BACKEND is 'vulkan'"):
         ss.render(ss.load("prism"), **SMALL)

@@ -189,11 +189,16 @@ def test_opengl_missing_or_too_old(
     problem: str | None, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     import glcontext
-    from spectrasplat.gpu import context
+    from spectrasplat.gpu import context, osmesa
+
+    def no_library(*_: object) -> None:
+        raise OSError("libOSMesa.so.8 is not installed")
 
     def refuse(**_: object) -> None:
         raise Exception(problem)
 
+    monkeypatch.delenv("SPECTRASPLAT_BACKEND", raising=False)
+    monkeypatch.setattr(osmesa, "load_library", no_library)
     monkeypatch.setattr(context, "_first_loadable", lambda names: None if problem is None else names[0])
     monkeypatch.setattr(glcontext, "get_backend_by_name", lambda _name: refuse)
     monkeypatch.chdir(tmp_path)

@@ -21,7 +21,7 @@ REAL_REQUIREMENTS = doctor.requirements
 
 class FakeContext:
     renderer, vendor, version = "NVIDIA H200", "NVIDIA Corporation", "4.6.0"
-    is_software, limits, advice = False, NEEDED, ""
+    backend, is_software, limits, advice = "egl", False, NEEDED, ""
     splats = SplatWay(True, "it blends 0.7 G fragments/s", 1 << 31)
 
     def release(self) -> None:
@@ -124,6 +124,7 @@ SMALL = replace(NEEDED, draw_buffers=4, work_group_count=(65535, 65535, 100), ve
         ("installed_version", OLD.get, "package numpy", "1.26.4, needed 2.0", "missing", "--upgrade 'numpy>=2.0'"),
         ("installed_version", OLD.get, "packages", "glfw 2.7.0", "ok", ""),
         ("installed_version", fails(PackageNotFoundError("glfw")), "package glfw", "not installed", "missing", "glfw"),
+        ("osmesa.load_library", fails(OSError("none")), "OSMesa", "not installed", "optional", ""),
         ("cache_dir", fails(PermissionError(13, "Permission denied", "/c")), "cache folder", "/c", "optional",
          "XDG_CACHE_HOME"),
         ("shaders_dir", lambda: Path("/nowhere/shaders"), "program files", "/nowhere/shaders", "missing", "reinstall"),
@@ -133,7 +134,7 @@ def test_what_is_missing_or_too_old(
     place: str, value: object, name: str, said: str, state: str, remedy: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """One thing is broken in each row."""
-    folder = "" if place.startswith(__name__) else f"{doctor.__name__}."
+    folder = "" if place.startswith(__name__) else "spectrasplat.gpu." if "osmesa" in place else f"{doctor.__name__}."
     monkeypatch.setattr(folder + place, value)
     check = found(name)
     assert said in check.found and check.state == state and remedy in check.remedy
