@@ -5,9 +5,11 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
+import pytest
 from spectrasplat.edit.requests import JudgeStone
 from spectrasplat.edit.state import Selection
 from spectrasplat.gpu.context import Context
+from spectrasplat.model.gems import report
 from spectrasplat.ui.export import Exports
 from spectrasplat.ui.panels.gem_panel import draw_gem_panel
 from spectrasplat.ui.screenshot import Shown
@@ -15,8 +17,9 @@ from spectrasplat.ui.screenshot import Shown
 from tests.interface.panel_rig import PanelRig, scene_state
 
 
-def test_a_stone_is_judged_in_the_window(gl: Context) -> None:
-    """Asked for, not there yet, there with four pictures, and old once the stone is of another glass."""
+def test_a_stone_is_judged_in_the_window(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Asked for, not there yet, there with four (small) pictures, and old once the stone is of another glass."""
+    monkeypatch.setattr(report, "SIDE", 64)
     exports = Exports(gl)
     with PanelRig(gl, draw_gem_panel, scene_state("brilliant")) as rig:
         rig.click("Judge diamond")
@@ -28,7 +31,7 @@ def test_a_stone_is_judged_in_the_window(gl: Context) -> None:
             note = exports.step(0.05)
         assert note is not None and "Gem panel" in note
         found = exports.found.entries().get("gem")
-        assert found is not None and found.codes.shape == (1024, 1024, 3) and dict(found.rows)["leak"]
+        assert found is not None and found.codes.shape == (128, 128, 3) and dict(found.rows)["leak"]
         rig.view_model = replace(rig.view_model, found={"gem": found})
         rig.frame(2)
         assert {"ISO", "Fire", "Scintillation"} <= set(rig.items.items)
