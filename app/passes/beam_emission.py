@@ -27,8 +27,9 @@ _BATCHES = 8
 class BeamEmission:
     """The pieces of one search, ready to be emitted in any number of passes."""
 
-    def __init__(self, scene: SceneBuffers, ray: Struct, pieces: BeamPieces, spans: Spans) -> None:
-        """`ray`: the trace pass's records; `spans`: bands of the spectral tables that photons are splatted by.
+    def __init__(self, scene: SceneBuffers, ray: Struct, pieces: BeamPieces, spans: Spans, widest: float = 1.0) -> None:
+        """`ray`: the trace pass's records; `spans`: bands of the spectral tables that photons are splatted by;
+        `widest`: band of a weak beam's photons, where glass disperses and bands may be cut.
 
         A photon's interval may be any part of the spectrum where bands may be cut, else it is that of a table's band. A
         line's is then all that is nearer to it than to another; where no band is cut a lamp's strongest line in a
@@ -40,6 +41,8 @@ class BeamEmission:
         self._features = scene.features
         if not self._features.band_cuts:
             pieces = _by_bands(_lines_as_bands(pieces, spans, scene), spans)
+        elif self._features.spectral_groups and widest < 1.0:
+            pieces = narrowed(pieces, widest)
         band = _bands(pieces, spans, any_interval=self._features.band_cuts)
         within = _is_line_within(pieces)
         self.pieces = pieces.where(~within)
@@ -191,13 +194,32 @@ def _by_bands(pieces: BeamPieces, spans: Spans) -> BeamPieces:
         for band in within if filled else [(lo, hi)]:
             rows.append(row)
             bands.append(band)
-    parts = pieces.take(np.array(rows, int))
-    ends = np.array(bands, float).reshape(-1, 2)
-    width = np.maximum(parts.x_hi - parts.x_lo, 1e-300)[:, None]
-    places = (np.stack([ends[:, 0], ends.mean(axis=1), ends[:, 1]], axis=1) - parts.x_lo[:, None]) / width
-    weight = np.stack([parabola_at(parts.weight, places[:, k]) for k in range(3)], axis=1)
-    key = parts.key ^ (ends[:, 0] * (1 << 20)).astype(np.int64)
-    return replace(parts, x_lo=ends[:, 0], x_hi=ends[:, 1], weight=np.maximum(weight, 0.0), key=key)
+    ends, chosen = np.array(bands, float).reshape(-1, 2), np.array(rows, int)
+    width = np.maximum(pieces.x_hi - pieces.x_lo, 1e-300)[chosen]
+    return _parts_of(pieces, chosen, *((ends.T - pieces.x_lo[chosen]) / width))
+
+
+def narrowed(pieces: BeamPieces, widest: float) -> BeamPieces:
+    """Weak beams' pieces in as many equal parts of their bands as none is wider than `widest`."""
+    width = pieces.x_hi - pieces.x_lo
+    parts = np.where(pieces.is_tail, np.ceil(width / widest), 1.0).clip(1.0).astype(int)
+    rows = np.repeat(np.arange(len(pieces)), parts)
+    first = (np.arange(len(rows)) - (np.cumsum(parts) - parts)[rows]) / parts[rows]
+    return _parts_of(pieces, rows, first, first + 1.0 / parts[rows])
+
+
+def _parts_of(pieces: BeamPieces, rows: np.ndarray, first: np.ndarray, last: np.ndarray) -> BeamPieces:
+    """Pieces `rows`, int (n,), from t = `first` to `last` of their bands."""
+    parts, width = pieces.take(rows), (pieces.x_hi - pieces.x_lo)[rows]
+    x_lo, places = parts.x_lo + first * width, (first, 0.5 * (first + last), last)
+    near, far = parts.edges[:, :3], parts.edges[:, 3:]
+    each = np.repeat(np.stack([first, last]), np.diff(parts.edge_start), axis=1)[..., None]
+    curves = {
+        name: np.stack([parabola_at(getattr(parts, name), t) for t in places], axis=1)
+        for name in ("position", "direction", "weight", "state")
+    }
+    edges, key = np.hstack([*(near + each * (far - near))]), parts.key ^ (x_lo * (1 << 20)).astype(np.int64)
+    return replace(parts, x_lo=x_lo, x_hi=parts.x_lo + last * width, edges=edges, key=key, **curves)
 
 
 def _is_line_within(pieces: BeamPieces) -> np.ndarray:

@@ -28,6 +28,10 @@ MIN_BEAM_PHOTONS = 1 << 17
 _DENSITY = 64.0
 """As many times more photons than an even lattice would have, at most, carry on weak beams, and all that beams leave
 where no others are traced; never more than a round's."""
+_WHOLE_BAND, _NARROWEST_BAND = 1e5, 0.25
+"""Photons of a pass up to which those that carry on weak beams keep these beams' bands, swept from where one wavelength
+goes; with more, such chords would be most of the error: bands are narrower by the power 2/3, down to this share of
+the spectrum."""
 _FEWEST = 256
 """Photons over the pieces of a light."""
 
@@ -150,50 +154,26 @@ class PassRounds:
         pieces = pieces.where(pieces.is_tail == tails)
         if not len(pieces):
             return
-        emission = BeamEmission(self.survey.buffers, batches.trace.ray, pieces, batches.records.tables.spans)
-        most, entered_w = batches.budget.units, beams.stats.entered_w
+        widest = max(min(1.0, _WHOLE_BAND / self.photons) ** (2.0 / 3.0), _NARROWEST_BAND)
+        emission = BeamEmission(self.survey.buffers, batches.trace.ray, pieces, batches.records.tables.spans, widest)
+        flux_w = {light: emission.flux_w(light) for light in np.unique(emission.pieces.light).tolist()}
+        total, roots = sum(flux_w.values()), sum(watts**0.5 for watts in flux_w.values())
         denser = 1.0 if self.plans and not tails else _DENSITY
-        for light, rays in _continuing_rays(emission, entered_w, share, weight, denser, most, self.seed, self._nth(of)):
-            self.into.stats.trace_seconds += time.perf_counter() - started
-            yield from batches.carry_on(rays, light, of, self.into, of_tails=tails)
-            started = time.perf_counter()
+        most_of_all = share * min(1.0, denser * total / max(beams.stats.entered_w, 1e-300))
+        for light, watts in flux_w.items():
+            # Tails are shared out among lights by the root of their flux.
+            count = most_of_all * (watts**0.5 / roots if tails else watts / total) if watts > 0.0 else 0.0
+            if count <= 0.0 or (tails and count < 1.0):
+                continue  # less than a 64th of a photon's power
+            words = self.seed, light, self._nth(of)
+            shifts = shift(*words, Dimension.LATTICE_U), shift(*words, Dimension.LATTICE_V)
+            key, count = random_word(*words, Dimension.BRANCH), max(_FEWEST, int(count))
+            for rays in emission.batches(light, count, weight, shifts, key, batches.budget.units):
+                self.into.stats.trace_seconds += time.perf_counter() - started
+                yield from batches.carry_on(rays, light, of, self.into, of_tails=tails)
+                started = time.perf_counter()
 
     @staticmethod
     def _nth(of: RoundOf) -> int:
         """A round's number among those of all passes."""
         return of.number * of.count + of.index
-
-
-def _continuing_rays(
-    emission: BeamEmission,
-    entered_w: float,
-    photons: float,
-    weight: float,
-    denser: float,
-    most: int,
-    seed: int,
-    number: int,
-) -> Iterator[tuple[int, np.ndarray]]:
-    """Light and ray records, at most `most` at once, of photons that carry on what beams left in round `number` of all
-    passes, all of it tails or none.
-
-    `entered_w`: W that met facets, `photons`: of the round, `weight`: factor on their flux; `denser`: as many times
-    more of them than an even lattice would have there, at most. Tails are shared out among lights by the root of
-    their flux."""
-    pieces = emission.pieces
-    flux_w = {int(light): emission.flux_w(int(light)) for light in np.unique(pieces.light)}
-    entered_w, total = max(entered_w, 1e-300), sum(flux_w.values())
-    roots = sum(watts**0.5 for watts in flux_w.values())
-    for light, watts in flux_w.items():
-        if watts <= 0.0:
-            continue
-        most_of_all = photons * min(1.0, denser * total / entered_w)
-        count = most_of_all * watts / total
-        if pieces.is_tail[0]:
-            count = most_of_all * watts**0.5 / roots
-            if count < 1.0:
-                continue  # less than a 64th of a photon's power
-        shifts = shift(seed, light, number, Dimension.LATTICE_U), shift(seed, light, number, Dimension.LATTICE_V)
-        key = random_word(seed, light, number, Dimension.BRANCH)
-        for rays in emission.batches(light, max(_FEWEST, int(count)), weight, shifts, key, most):
-            yield light, rays

@@ -9,6 +9,7 @@ import pytest
 from spectrasplat.beams.piece_lattice import PieceLattice, PieceRays
 from spectrasplat.beams.polygons import BeamPieces, joined
 from spectrasplat.model.optics.spectral_tables import CumulativeSpectrum
+from spectrasplat.passes.beam_emission import narrowed
 
 EVEN = CumulativeSpectrum(np.array([0.0, 1.0]), np.outer([0.0, 2.0], [1.0, 1.0, 1.0, 1.0]))
 """2 W, spread evenly over x."""
@@ -116,9 +117,12 @@ def test_cells_inside_are_a_lattice_and_those_at_edges_as_wide_as_their_part() -
 
 @pytest.mark.parametrize("move", [(0.5, 0.0), (30.0, 0.0), (0.0, 4.0)])
 @pytest.mark.parametrize("count", [5, 300, 20_000])
-def test_what_moves_is_lit_for_as_long_as_it_is_there(move: tuple[float, float], count: int) -> None:
+@pytest.mark.parametrize("widest", [1.0, 0.35])
+def test_what_moves_is_lit_for_as_long_as_it_is_there(move: tuple[float, float], count: int, widest: float) -> None:
     corners = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]])
-    rays = rays_of(piece(corners, move, band=(0.0, 1.0)), count)
+    whole = replace(piece(corners, move, band=(0.0, 1.0)), is_tail=np.array([widest < 1.0]))
+    rays = rays_of(narrowed(whole, widest), count)
+    assert np.ptp(rays.band, axis=1).max() < widest + 1e-9
     assert rays.flux_w.sum() == pytest.approx(2.0 * 2.0, rel=5e-3 if count > 100 else 0.05)
     if count < 1000:
         return
