@@ -30,8 +30,7 @@ _DENSITY = 64.0
 where no others are traced; never more than a round's."""
 _WHOLE_BAND, _NARROWEST_BAND = 1e5, 0.25
 """Photons of a pass up to which those that carry on weak beams keep these beams' bands, swept from where one wavelength
-goes; with more, such chords would be most of the error: bands are narrower by the power 2/3, down to this share of
-the spectrum."""
+goes: with more the chord would be most of the error. They narrow by the power 2/3, to this share of the spectrum."""
 _FEWEST = 256
 """Photons over the pieces of a light."""
 
