@@ -147,9 +147,10 @@ def total_from(nodes, before, after, facets, solids, tables, sources, work):
     beam.path[flight, 2], beam.path[flight, 3] = before, after
     for a in range(first_place(beam), last_place(beam)):
         total_line(facet, tables, before, after, beam.x[a], beam.direction[a], beam.centre[0], beam.centre[1], lines[a])
-    for c in range(beam.corners[1]):
-        value = lines[1, 0] + lines[1, 1] * beam.corner[1, c, 0] + lines[1, 2] * beam.corner[1, c, 1]
-        least, most = min(least, value), max(most, value)
+        # Penumbrae of what exists at one end alone are wider than it: an extended light's is looked at in the middle.
+        for c in range(beam.corners[a] if a == 1 or work.sources == 1 else 0):
+            value = lines[a, 0] + lines[a, 1] * beam.corner[a, c, 0] + lines[a, 2] * beam.corner[a, c, 1]
+            least, most = min(least, value), max(most, value)
     if not (least < -_GRAZING and most > _GRAZING):
         beam.total = total
         return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from reference.beam_scenes import ONSET, SWEPT
+from reference.beam_scenes import ONSET, PRISM, SWEPT
 from reference.beam_sums import cells
 from reference.beam_worlds import Rig, at_index, grid_about, scene_of
 from spectrasplat.base.paths import shipped_scenes
@@ -121,3 +121,21 @@ def test_a_band_across_the_onset_of_total_reflection_is_cut_there() -> None:
     swept, summed, total, total_summed, _ = swept_and_summed(ONSET)
     assert np.abs(swept - summed).max() < BOUND["onset"] * summed.max()
     assert total == pytest.approx(total_summed, rel=1e-3)
+
+
+def test_what_passes_beside_the_onset_of_total_reflection_is_found() -> None:
+    """A point over a prism's edge: where a beam is cut at the onset of its middle, one part passes through half of its
+    outline at that end of the band alone. A quarter of the light that leaves at grazing angles was reflected there."""
+    point = '[[lights]]\nkind = "point"\nposition = [0.13, 0.0, 2.0]\nintensity_cd = 1000\n'
+    prism = PRISM.replace("[-90.0, 7.0, 3.0]", "[0.0, 15.0, 0.0]").replace(
+        "rests_at_z = 0.5", "position = [0.2, 0.0, 1.0]"
+    )
+    places = (np.arange(12) + 0.5) / 12.0
+    rig = Rig(scene_of(point + prism), texel=0.02)
+    emission = rig.emissions()[0]
+    swept, _ = rig.polygons(emission, 1e-4)
+    single, _ = rig.polygons(at_index(emission, *places), 1e-4)
+    of_place = np.diff(np.interp(np.arange(13) / 12.0, np.linspace(0.0, 1.0, len(emission.watts)), emission.watts))
+    watts = of_place[np.abs(single.x_lo[:, None] - places).argmin(axis=1)] * single.flux
+    found = swept.flux[swept.centre[:, 0] > 1.7].sum()
+    assert found == pytest.approx(watts[single.centre[:, 0] > 1.7].sum(), rel=0.1)
