@@ -53,6 +53,9 @@ COARSEST, FINEST = 1e-2, 1e-9
 _GROWTH, _GROWTH_WITH_TAILS = 0.8, 1.0
 """The number of beams is about proportional to this power of one over the threshold, in a cut stone; where
 weak beams play roulette, and where they are left to photons."""
+_FEWEST = 200.0
+"""Beams: a survey that followed fewer says too little of weak ones, and is done again `_AGAIN` times as finely."""
+_AGAIN = 0.1
 _ENOUGH = 4.0
 """A search that followed this many times fewer beams than there is time for is done again."""
 _DEAREST = 3e7
@@ -181,14 +184,18 @@ class BeamLight:
             search = partial(self.finder.find, at, self._depth, _MOVING_WORD, light_parts, tails=tails)
             return (yield from mapped(self._worker.searched(search, pays, None), lambda share: None))
 
-        strongest = yield from surveyed(SURVEY, tails=True)
+        at = SURVEY
+        strongest = yield from surveyed(at, tails=True)
+        if strongest.followed() < _FEWEST and pays(0):
+            at *= _AGAIN
+            strongest = yield from surveyed(at, tails=True)
         # In motion weak beams play roulette, and none is left to photons.
         found = strongest if moving is None else (yield from surveyed(moving.threshold, tails=False))
         if not pays(0):
             self.why_not = "the strongest beams alone are so many that photons are cheaper"
             return
         # As many as there would be at the survey's own threshold.
-        to_survey = 1.0 if moving is None else (moving.threshold / SURVEY) ** _GROWTH
+        to_survey = ((at if moving is None else moving.threshold) / SURVEY) ** _GROWTH
         if sum(found.followed(light) for light in strongest.plays) * to_survey > MANY:
             self.why_not = (
                 "weak beams of lights with emission lines over a continuum are so many that photons leave less noise"
@@ -199,7 +206,8 @@ class BeamLight:
             return
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
-        self._surveyed, self._with_tails = max(1.0, found.followed() * to_survey), max(1.0, strongest.followed())
+        with_tails = strongest.followed() * (at / SURVEY) ** _GROWTH_WITH_TAILS
+        self._surveyed, self._with_tails = max(1.0, found.followed() * to_survey), max(1.0, with_tails)
         self._beams_a_point = self._with_tails / light_parts
         if strongest.polygons is not None:
             self._light_parts = parts_for(strongest.polygons, self._watts(strongest.polygons), light_parts)
