@@ -121,7 +121,7 @@ class MethodRig:
         tuned = method not in OWN_METHODS and self._light.features.footprints
         self.kernels: tuple[float, ...] = KERNELS if tuned else ()
         # Drivers put off part of the compiling until a program runs.
-        seen = self.render(WARM_UP_PHOTONS, 1).xyz.any()
+        seen = bool(scene.lights) and self.render(WARM_UP_PHOTONS, 1).xyz.any()
         warm = self._finished()
         if not seen:
             self.release()

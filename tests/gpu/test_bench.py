@@ -78,6 +78,8 @@ def test_a_scene_that_throws_no_light_is_said(gl: Any, prism: Scene) -> None:
     dark = replace(prism, objects=tuple(o for o in prism.objects if type(o.material).__name__ != "Dielectric"))
     with pytest.raises(UserError, match="nothing to measure"):
         MethodRig(gl, dark, "srd", WIDTH, HEIGHT)
+    with pytest.raises(UserError, match="nothing to measure"):
+        MethodRig(gl, replace(prism, lights=()), "srd", WIDTH, HEIGHT)
 
 
 def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
