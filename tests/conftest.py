@@ -42,6 +42,11 @@ if "PYTEST_XDIST_WORKER_COUNT" in os.environ:
 # processes share the cores: the program does without too. Set before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# Pictures come and go by the hundred thousand: what is freed stays with the process, which otherwise gets, and clears,
+# the same pages again each time. glibc reads both when a process starts, so this is for the processes that share tests.
+os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", str(32 << 20))
+os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(256 << 20))
+
 # What the driver compiled is kept for the next run. Mesa's folder is named for tests that set a cache folder of their
 # own.
 os.environ.setdefault("MESA_SHADER_CACHE_DIR", platformdirs.user_cache_dir())

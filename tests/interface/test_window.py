@@ -81,34 +81,28 @@ import ctypes, glfw
 from imgui_bundle import imgui
 from spectrasplat.ui.window import Window
 
-window = Window()
-window._host.make_current()
-exchange = ctypes.CFUNCTYPE(*[ctypes.c_void_p] * 3)(("glfwSetKeyCallback", glfw._glfw))
-handle = ctypes.cast(window._handle, ctypes.c_void_p).value
-installed = exchange(handle, None)  # imgui's, which calls the window's own before
-call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *[ctypes.c_int] * 4)(installed)
-seen = []
-def frame():
-    imgui.backends.glfw_new_frame()
-    with window._host.frame():
-        if imgui.is_key_pressed(imgui.Key.r, False):
-            seen.append(imgui.get_io().key_ctrl)
-io = imgui.get_io()
-io.add_key_event(imgui.Key.mod_ctrl, True)
-frame()
-io.add_key_event(imgui.Key.r, True)
-call(handle, glfw.KEY_LEFT_CONTROL, 37, glfw.RELEASE, 0)
-io.add_key_event(imgui.Key.mod_ctrl, False)
-for _ in range(4):
+with Window() as window:
+    window._host.make_current()
+    exchange = ctypes.CFUNCTYPE(*[ctypes.c_void_p] * 3)(("glfwSetKeyCallback", glfw._glfw))
+    handle = ctypes.cast(window._handle, ctypes.c_void_p).value
+    installed = exchange(handle, None)  # imgui's, which calls the window's own before
+    call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, *[ctypes.c_int] * 4)(installed)
+    seen = []
+    def frame():
+        imgui.backends.glfw_new_frame()
+        with window._host.frame():
+            if imgui.is_key_pressed(imgui.Key.r, False):
+                seen.append(imgui.get_io().key_ctrl)
+    io = imgui.get_io()
+    io.add_key_event(imgui.Key.mod_ctrl, True)
     frame()
-print(seen)
+    io.add_key_event(imgui.Key.r, True)
+    call(handle, glfw.KEY_LEFT_CONTROL, 37, glfw.RELEASE, 0)
+    io.add_key_event(imgui.Key.mod_ctrl, False)
+    for _ in range(4):
+        frame()
+    print("letter", seen)
 """
-
-
-@pytest.mark.slow
-def test_the_window_keeps_ctrl_down_for_the_letter_of_a_long_frame(tmp_path: Path, display: str) -> None:
-    done = run(tmp_path, display, "-c", LETTER_OUTLIVES_CTRL)
-    assert done.stdout.strip() == "[True]", done.stderr
 
 
 INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN = """
@@ -134,13 +128,8 @@ with Window() as window:
         return state
     viewer._draw = draw
     window.frame(viewer)
-    print(seen)
+    print("input", seen)
 """
-
-
-def test_a_long_frame_hears_of_input(tmp_path: Path, display: str) -> None:
-    done = run(tmp_path, display, "-c", INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN)
-    assert done.stdout.strip() == "[(False, True)]", done.stderr
 
 
 A_PICTURE_IS_DROPPED = """
@@ -163,14 +152,8 @@ with Window() as window:
     window._take_events(viewer)
     window.frame(viewer)
     compare = session.state.compare
-    print([compare.mode, compare.method, str(compare.file)], len(session.state.requests))
+    print("drop", [compare.mode, compare.method, str(compare.file)], len(session.state.requests))
 """
-
-
-def test_a_picture_dropped_while_comparing_is_compared_with(tmp_path: Path, display: str) -> None:
-    """What glfw itself calls for a drop, as the window has installed it."""
-    done = run(tmp_path, display, "-c", A_PICTURE_IS_DROPPED)
-    assert done.stdout.strip() == "['wipe', 'file', 'größer.exr'] 0", done.stderr
 
 
 A_PATH_IS_TYPED_IN_ONE_FRAME = """
@@ -222,11 +205,29 @@ with Window() as window:
         window.frame(viewer)
         if session.document.source == path:
             break
-    print(session.document.source == path, frames <= 9, frames)
+    print("path", session.document.source == path, frames <= 9, frames)
 """
 
 
-def test_a_path_that_is_typed_at_once_takes_no_frame_a_letter(tmp_path: Path, display: str) -> None:
-    """A click on Open, a whole path and Enter, all while one long frame is drawn."""
-    done = run(tmp_path, display, "-c", A_PATH_IS_TYPED_IN_ONE_FRAME)
-    assert done.stdout.startswith("True True"), done.stdout + done.stderr
+@pytest.mark.parametrize(
+    ("what", "told"),
+    [
+        ("letter", "[True]"),
+        ("input", "[(False, True)]"),
+        ("drop", "['wipe', 'file', 'größer.exr'] 0"),
+        ("path", "True True"),
+    ],
+)
+def test_what_a_window_hears_of(heard: dict[str, str], what: str, told: str) -> None:
+    """Ctrl stays down for the letter of a long frame; a long frame knows of input; a picture that is dropped while
+    comparing is compared with; a click on Open, a whole path and Enter, all while one long frame is drawn, take few."""
+    assert what in heard, heard["errors"]
+    assert heard[what].startswith(told)
+
+
+@pytest.fixture(scope="module")
+def heard(tmp_path_factory: pytest.TempPathFactory, display: str) -> dict[str, str]:
+    """What one process says of a window after the other, each by what glfw itself calls."""
+    scripts = LETTER_OUTLIVES_CTRL, INPUT_IS_SEEN_WHILE_A_FRAME_IS_DRAWN, A_PICTURE_IS_DROPPED
+    done = run(tmp_path_factory.mktemp("window"), display, "-c", "".join((*scripts, A_PATH_IS_TYPED_IN_ONE_FRAME)))
+    return {"errors": done.stderr} | dict(line.split(" ", 1) for line in done.stdout.splitlines())
