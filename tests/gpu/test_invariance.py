@@ -187,7 +187,7 @@ def through_ball(gl) -> tuple[Scene, np.ndarray]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("scale", [2.0**10, pytest.param(2.0**-10, marks=SLOW)])
+@pytest.mark.parametrize("scale", [2.0**10, 2.0**-10])
 def test_units_of_length_by_powers_of_two_change_nothing(gl, original: np.ndarray, scale: float) -> None:
     # Of slivers of beams that are left to photons, rounding decides how their lattices lie.
     assert difference(picture(gl, moved(scene(), placed(scale))), original) < 2e-4

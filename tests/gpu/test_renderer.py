@@ -15,7 +15,6 @@ from spectrasplat.model.settings import METHODS, RenderSettings
 from spectrasplat.render.still import render
 
 SCENES = sorted(p.stem for p in (assets_dir() / "scenes").glob("*.toml"))
-QUICK = ("ball", "brilliant", "prism_edge", "spectrometer", "two_stones")
 SMALL = RenderSettings(width=96, height=54, photons=20_000, spp=2)
 
 PRISM = """
@@ -74,9 +73,7 @@ def scene_of(tmp_path: Path, shape: str = "prism") -> Scene:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in SCENES]
-)
+@pytest.mark.parametrize("name", SCENES)
 def test_flux_closes_in_every_shipped_scene(gl, name: str) -> None:
     result = render(load_scene(assets_dir() / "scenes" / f"{name}.toml"), SMALL, context=gl)
     # The one has no light, the other's lamp throws next to nothing through the glass onto what is there: 2e-6 of it,

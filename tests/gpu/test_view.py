@@ -165,16 +165,21 @@ SLAB = {
 }
 
 
-def test_the_spectrum_under_the_cursor_is_true() -> None:
+@pytest.fixture(scope="module")
+def slab() -> Iterator[ss.Session]:
+    with ss.Session(ss.load(SLAB), size=(96, 54), photons=20_000, spp=1) as session:
+        yield session
+
+
+def test_the_spectrum_under_the_cursor_is_true(slab: ss.Session) -> None:
     """Below a slab as much light arrives as two faces let through, all reflections between them counted: (1 − R)/(1 +
     R) with R = ((n − 1)/(n + 1))²; beside it all of it, as direct light."""
-    scene = ss.load(SLAB)
-    light = scene._model.lights[0].spectral_power
-    with ss.Session(scene, size=(96, 54), photons=20_000, spp=1) as session:
-        view, browser = viewed(session)
-        until(lambda: next((p for p in browser.pictures if p[0]["done"]), None))
-        below, beside = browser.light(0.5, 0.55), browser.light(0.05, 0.55)
-        assert repr(view) == "View of 'scene'"
+    light = slab.scene._model.lights[0].spectral_power
+    view, browser = viewed(slab)
+    until(lambda: next((p for p in browser.pictures if p[0]["done"]), None))
+    below, beside = browser.light(0.5, 0.55), browser.light(0.05, 0.55)
+    assert repr(view) == "View of 'scene'"
+    view.close()
     assert abs(below["position"][0]) < 0.9 and abs(below["position"][1]) < 0.9 < abs(beside["position"][0])
     nm = np.array(below["wavelength_nm"])
     half = 0.5 * (nm[1] - nm[0])
@@ -192,15 +197,12 @@ def test_the_spectrum_under_the_cursor_is_true() -> None:
     assert beside["direct"] == pytest.approx(light.binned(np.append(nm - half, nm[-1] + half)), rel=1e-6)
 
 
-def test_without_a_kernel_it_is_a_picture_with_a_sentence() -> None:
-    with ss.Session(ss.load(SLAB), size=(32, 18), photons=2_000, spp=1) as session:
-        view = session.view()
-        assert not view.is_live and repr(view).startswith("View of ")
-        bundle = view._repr_mimebundle_()
-        assert bundle["text/plain"] in bundle["text/html"]
-        assert bundle["text/plain"].endswith((": pip install anywidget, then restart the kernel", "alone"))
-    with pytest.raises(ss.UserError, match="this session is closed"):
-        session.view()
+def test_without_a_kernel_it_is_a_picture_with_a_sentence(slab: ss.Session) -> None:
+    view = slab.view()
+    assert not view.is_live and repr(view).startswith("View of ")
+    bundle = view._repr_mimebundle_()
+    assert bundle["text/plain"] in bundle["text/html"]
+    assert bundle["text/plain"].endswith((": pip install anywidget, then restart the kernel", "alone"))
 
 
 def test_without_anywidget_the_sentence_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:

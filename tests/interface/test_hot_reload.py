@@ -53,7 +53,7 @@ def frames_until_error_is(hands: Hands, present: bool) -> str | None:
     raise AssertionError(f"shader error still {told!r}")
 
 
-def test_a_mistake_is_shown_with_file_and_line_and_the_picture_stays(hands: Hands, shaders: Path) -> None:
+def test_a_mistake_is_shown_with_file_and_line_and_a_change_in_the_picture(hands: Hands, shaders: Path) -> None:
     before = hands.picture()
     edit(shaders / "camera/camera.comp", "void main() {", "void main() {\n    this is no GLSL;")
     line = (shaders / "camera/camera.comp").read_text().splitlines().index("    this is no GLSL;") + 1
@@ -64,9 +64,6 @@ def test_a_mistake_is_shown_with_file_and_line_and_the_picture_stays(hands: Hand
     edit(shaders / "camera/camera.comp", "    this is no GLSL;\n", "")
     frames_until_error_is(hands, present=False)
     assert np.abs(hands.settle() - before).max() <= 1e-5 * before.max()
-
-
-def test_a_change_on_disk_shows_in_the_picture(hands: Hands, shaders: Path) -> None:
     hands.interface.frame(2)
     box = hands.interface.find("Picture")
     (left, top), (right, bottom) = box.at(0.02, 0.02), box.at(0.98, 0.98)

@@ -216,12 +216,7 @@ def prism(roughness: float, polarisation: bool = False, smooth: bool = False) ->
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "polarisation", "smooth"),
-    [
-        ("srd", False, False),
-        pytest.param("srd", True, False, marks=pytest.mark.slow),
-        ("srd", False, True),
-        pytest.param("hero", False, False, marks=pytest.mark.slow),
-    ],
+    [("srd", False, False), ("srd", True, False), ("srd", False, True), ("hero", False, False)],
 )
 def test_spectra_through_ground_flint(gl: Context, method: str, polarisation: bool, smooth: bool) -> None:
     """One microfacet for all of a band: its spectral column carries on through it."""
