@@ -1,7 +1,8 @@
 """Programs before compilers that forgive nothing: Khronos' reference front end and the validator of its SPIR-V.
 
 Drivers are lenient in different places; what both of these accept is GLSL by the book. They are programs of their own
-(Debian: glslang-tools, spirv-tools), so a machine may lack them.
+(Debian: glslang-tools, spirv-tools), so a machine may lack them. What NVIDIA's compiler was seen to refuse although it
+is by the book is looked for in the front end's syntax tree.
 """
 
 from __future__ import annotations
@@ -28,6 +29,17 @@ _LOOP = re.compile(r"\bfor \(u?int (\w+) = 0u?; \1 < (?:uint\()?(\w+?)u?\)?; \+\
 _BODY = re.compile(r"\s*(?:[^{;]*;|\{(?:[^{}]|\{[^{}]*\})*\})")
 """A statement, or a block with none but flat ones in it."""
 _REFLECTION = "Uniform block reflection:"
+_NODE = re.compile(r"\d+:(\d+)( +)(.*)")
+"""Of a syntax tree: line, depth, what it is."""
+_QUALIFIED_RECORD = re.compile(r"[^{]*\b(?:restrict|readonly|writeonly|coherent)\b[^{]*\bstructure\{")
+_REFUSED = {
+    "Function Call: ": (_QUALIFIED_RECORD, "a record of a qualified block is handed to a function: copy it first"),
+    "direct index (": (
+        re.compile(r"[^{]*\bbuffer runtime-sized array\b"),
+        "an array without a size has a constant index, and is taken for as long as the largest: give it a size",
+    ),
+}
+"""By what a node begins with: what may not stand directly below it, and why."""
 
 
 def missing() -> str:
@@ -46,9 +58,22 @@ def complaints(built: Built) -> list[str]:
         if said:  # what does not compile need not be translated
             return [_located(built, line) for line in said]
         for file in files:
+            said += _refused_by_nvidia(file)
             said += _run(*_translation(file))
             said += _run(VALIDATOR, "--target-env", _ENVIRONMENT, f"{file}.spv")
     return [_located(built, line) for line in said]
+
+
+def _refused_by_nvidia(file: str) -> list[str]:
+    said, above = [], [(-1, "")]
+    for number, indent, node in _NODE.findall(_output(FRONT_END, "-i", file)[1]):
+        while above[-1][0] >= len(indent):
+            above.pop()
+        for begin, (refused, why) in _REFUSED.items():
+            if above[-1][1].startswith(begin) and refused.match(node):
+                said.append(f"ERROR: {file}:{number}: {why}")
+        above.append((len(indent), node))
+    return said
 
 
 def blocks(built: Built) -> set[str]:

@@ -114,7 +114,7 @@ class TextureStore:
         self._tiles: list[Tile] = []
         self._filled_for: tuple[list[object], np.ndarray] = [], np.zeros(0)
         self.defines: dict[str, int] = {}
-        """TEXTURE_COUNT (textured objects), HAS_TEXTURES, HAS_ENVIRONMENT_MAP, TEXTURES_IMAGE; only what there is."""
+        """PICTURE_COUNT, HAS_TEXTURES, HAS_ENVIRONMENT_MAP, TEXTURES_IMAGE; only what there is."""
         self.structs: tuple[Struct, ...] = (PICTURE,) if self._sources else ()
         if self._sources:
             self._pictures = self._packed()
@@ -209,7 +209,7 @@ class TextureStore:
         self._records = self.ctx.buffer(np.ascontiguousarray(records))
         self._corners = None if texels is None else _texture(self.ctx, texels)
         self._filled_for = _wearers(scene), corner_turn
-        self.defines = {"TEXTURE_COUNT": len(textured)}
+        self.defines = {"PICTURE_COUNT": len(records)}
         switches = {
             "HAS_TEXTURES": textured,
             "HAS_ENVIRONMENT_MAP": scene.environment is not None,

@@ -177,8 +177,10 @@ void follow(uint entry, bool resumes) {
             if (HALTS) halts = rounds >= uint(RANDOM_WAVELENGTH ? HALT_ROUNDS / 3 : HALT_ROUNDS);
         }
         if (goes_on) push(path);
-        for (int e = 0; e < found; ++e)
-            add_end(ENDED(e).path, ENDED(e).met != 0u, ENDED(e).hit, ENDED(e).same_hit != 0u, pixel_key);
+        for (int e = 0; e < found; ++e) {
+            PathEnd end = ENDED(e);  // NVIDIA's compiler hands no part of a `restrict` block to a function
+            add_end(end.path, end.met != 0u, end.hit, end.same_hit != 0u, pixel_key);
+        }
     }
     if (HALTS) {
         if (!loops_run()) atomicAdd(fallbacks[FELL_LOOPS], 1u);

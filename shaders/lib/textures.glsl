@@ -7,7 +7,9 @@
 
 #include "lib/optics.glsl"
 
-layout(std430, binding = BIND_PICTURES) readonly restrict buffer Pictures { Picture pictures[]; };
+layout(std430, binding = BIND_PICTURES) readonly restrict buffer Pictures {
+    Picture pictures[PICTURE_COUNT];  // of textured objects, then of the environment
+};
 #if TEXTURES_IMAGE
 layout(rgba32f, binding = UNIT_PICTURES) uniform readonly restrict image2D picture_texels;
 #else
@@ -145,7 +147,7 @@ vec2 environment_place(vec3 direction) {
 // care. Texels below level 0 are about as wide as high on the sphere (mip_chain.py), so the height of the picture
 // alone says which level is as coarse as the patch.
 vec3 environment_radiance(vec3 direction, vec3 ddirection_ds, vec3 ddirection_dt) {
-    Picture picture = pictures[TEXTURE_COUNT];
+    Picture picture = pictures[PICTURE_COUNT - 1];
     float texels_per_rad = float(picture.size.y) * 0.31830988618;
     vec3 side_s = clamp(ddirection_ds, -4.0, 4.0), side_t = clamp(ddirection_dt, -4.0, 4.0);
     float longer, shorter, level, taps;

@@ -74,7 +74,7 @@ void main() {
     uint group = gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x;
     if (group >= count) return;
     int target = int(gl_WorkGroupID.z), at = 0;
-    for (int next = tiles[0].w; next > 0 && uint(tiles[next].x) <= group; next = tiles[next].w) at = next;
+    for (int next = tiles[at].w; next > 0 && uint(tiles[next].x) <= group; next = tiles[next].w) at = next;
     ivec4 head = tiles[at];
     int even_parts = head.z >> 8;
     head.z &= 255;

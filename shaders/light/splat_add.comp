@@ -11,7 +11,7 @@ layout(local_size_x = LANES) in;
 #include "light/splat_sides.glsl"
 #include "light/splat_pieces.glsl"
 
-layout(std430, binding = 3) readonly buffer Commands { uint kind_words[]; };
+layout(std430, binding = 3) readonly buffer Commands { uint kind_words[KIND_WORDS * KINDS]; };
 layout(std430, binding = 8) readonly buffer Entries { uvec2 entries[]; };  // slot, piece (splat_list_any.comp)
 uniform uint entries_room;
 #include "light/splat_entries.glsl"

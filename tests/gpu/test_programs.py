@@ -104,6 +104,28 @@ def test_strict_compilers_refuse_what_drivers_let_pass() -> None:
     assert "Types must match" in " ".join(strict_compilers.complaints(Built(tuple(ends), 0.0)))
 
 
+@needs_tools
+def test_what_nvidia_refuses_is_found() -> None:
+    """Records of a qualified block as arguments, and an unsized array that a loop alone indexes otherwise; not what is
+    copied before, or has a size."""
+    lines = (
+        "layout(local_size_x = 1) in;",
+        "struct Pair { float a; float b; };",
+        "layout(std430, binding = 0) restrict buffer Pairs { Pair pairs[]; };",
+        "layout(std430, binding = 1) buffer Sums { float sums[]; };",
+        "float sum(Pair of) { return of.a + of.b; }",
+        "void main() {",
+        "uint at = gl_GlobalInvocationID.x;",
+        "for (uint i = 1u; i < 4u; ++i) sums[0] += sums[i];",
+        "sums[at] += sum(pairs[at]);",
+        "}",
+    )
+    said = strict_compilers.complaints(built_of("bad.comp", *lines))
+    assert [sentence.partition(": error")[0] for sentence in said] == ["bad.comp:9", "bad.comp:10"]
+    mended = [line.replace("sums[];", "sums[4];").replace("sum(pairs[at])", "pairs[at].a") for line in lines]
+    assert strict_compilers.complaints(built_of("good.comp", *mended)) == []
+
+
 def test_flags_that_lie_in_memory_are_no_bools() -> None:
     """See shaders/README.md: structs that are held in arrays, and arrays."""
     texts = [

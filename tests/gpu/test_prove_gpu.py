@@ -20,6 +20,7 @@ from spectrasplat.bench.stored_pictures import LARGEST_ERROR, SCENES, block_erro
 from spectrasplat.commands import prove_gpu
 from spectrasplat.commands.measuring_table import MEASURED_PARTS
 from spectrasplat.commands.proof_steps import PARTS, Finding
+from spectrasplat.gpu.context import create_context
 
 SOFTWARE = '{"name": "machine renderer", "value": "some"}\n{"name": "is software", "value": "yes"}\n'
 
@@ -49,6 +50,14 @@ def test_the_whole_short_form_on_this_machine(tmp_path: Path, capsys: pytest.Cap
     assert [part["key"] for part in proof["parts"]] == [part.key for part in PARTS]
     lines = [json.loads(line) for line in (tmp_path / "figures.jsonl").read_text().splitlines()]
     assert {line["part"] for line in lines if "ended" not in line} == {"doctor", *MEASURED_PARTS}
+
+
+@pytest.mark.hardware
+def test_everything_holds_on_this_machines_gpu(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with create_context() as context:
+        if context.is_software:
+            pytest.skip("no GPU draws here")
+    assert proved(tmp_path)[0] == 0, capsys.readouterr().out
 
 
 def test_a_driver_that_crashes_ends_one_part(

@@ -276,7 +276,7 @@ def test_a_scene_without_pictures_has_nothing(gl) -> None:
     store.bind(BINDING, UNIT)
     store.release()
     only_sky = store_of(gl, scene_of(None, environment=picture(8, 16)))
-    assert "HAS_TEXTURES" not in only_sky.defines and only_sky.defines["TEXTURE_COUNT"] == 0
+    assert "HAS_TEXTURES" not in only_sky.defines and only_sky.defines["PICTURE_COUNT"] == 1
     only_sky.release()
     only_texture = store_of(gl, scene_of(Texture(picture(8, 16))))
     assert "HAS_ENVIRONMENT_MAP" not in only_texture.defines
