@@ -227,16 +227,23 @@ def hold_in(beam, facets, solids, tables, source, work):
 
 
 @part
+def is_of_last(beam, ln):
+    """Whether a half-plane is of an edge of the facet left last: not of what stands before that."""
+    made, last = beam.made[ln], beam.flight - 1
+    return made[0] == last and made[1] == beam.path[last, 0] and made[2] >= 0
+
+
+@part
 def mask_edges(beam, own_lines, new, edge, corner, work):
     """Turn those half-planes of the facet left last that penumbrae reach, and that are sharper than these, into masks
     (negative softness): behind the first `own_lines`, which stay what they are. The others of `hold_in` are dropped."""
-    first, last, lines = work.count[1], beam.flight - 1, beam.lines
+    first, lines = work.count[1], beam.lines
     widest = 0.0
     for ln in range(own_lines):
         widest = max(widest, edge[first + ln].soft)
     kept = lines
     for ln in range(lines):
-        if beam.made[ln, 0] != last or beam.made[ln, 2] < 0 or not edge[first + ln].soft < _SHARP * widest:
+        if not is_of_last(beam, ln) or not edge[first + ln].soft < _SHARP * widest:
             continue
         line, nearest, begin = edge[first + ln].line, 1e300, work.count[2]
         for a in range(first_place(beam), last_place(beam)):
@@ -343,7 +350,7 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
             at = e[1, 0] * cu + e[1, 1] * cv + e[1, 2]
             if turn == 0:
                 own[ln], soft[ln] = at, 0.0
-            elif kind == LEAF_RECEIVER and beam.made[ln, 0] == beam.flight - 1 and beam.made[ln, 2] >= 0:
+            elif kind == LEAF_RECEIVER and is_of_last(beam, ln):
                 moved = moves(beam, spare, ln, facets, work)
                 soft[ln] += moved * moved
             elif beam.made[ln, 2] != HALF and (beam.made[ln, 2] != STATIC or kind == LEAF_RECEIVER):

@@ -214,21 +214,41 @@ glass = "N-BK7"
 """
 
 
-def test_penumbrae_of_a_far_window_are_as_wide_as_it_is_seen() -> None:
+MIRROR_BEHIND_BAR = """
+[[objects]]
+name = "mirror"
+shape = "box"
+size = [0.02, 0.8, 0.5]
+position = [0.01, 0.0, 1.0]
+material = "mirror"
+[[objects]]
+name = "bar"
+shape = "box"
+size = [1.0, 3.0, 1e-3]
+position = [-0.667, 0.0, 1.5]
+material = "black"
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "middle", "ends"), [(PANE_ABOVE, 1.0, [1.0, 1.0]), (MIRROR_BEHIND_BAR, 1.125, [1.25, 1.5])]
+)
+def test_penumbrae_of_a_far_window_are_as_wide_as_it_is_seen(text: str, middle: float, ends: list[float]) -> None:
     """Rays of its other points were taken to be straight about a place as far from the glass as these points are from
-    each other: penumbrae forty times too wide, which held back a tenth of the light."""
-    rig = Rig(scene_of(WINDOW + PANE_ABOVE))
+    each other: penumbrae forty times too wide, which held back a tenth of the light. Edges of what stands before a
+    mirror were taken for the mirror's own: up to a million times too wide."""
+    rig = Rig(scene_of(WINDOW + text))
     parts = rig.emissions(parts=16)
     leaves, _ = rig.find(parts[len(parts) // 2], 1e-2)
     found = Leaves.joined(leaves)
     strongest = int(found.leaf["flux"].argmax())
     edges = found.edge[found.leaf["edges"][:strongest].sum() :][: found.leaf["edges"][strongest]]
     across = np.abs(edges["line"][:, 1, :2] @ rig.beams.facets["frame"][found.leaf["facet"][strongest], 1:])[:, 1] > 0.9
-    # A part is half of the lamp's width and an eighth of its length; its light falls slantwise from a height of 1.
+    # A part is half of the lamp's width and an eighth of its length; its light falls slantwise from such heights.
     slant = np.hypot(600.0, 1800.0) / 1800.0
     assert len(parts) == 16 and across.any() and not across.all()
-    assert edges["soft"][across] == pytest.approx(10.0 / 1897.4 * slant, rel=0.05)
-    assert edges["soft"][~across] == pytest.approx(200.0 / 8.0 / 1897.4 * slant**2, rel=0.05)
+    assert edges["soft"][across] == pytest.approx(middle * 10.0 / 1897.4 * slant, rel=0.05)
+    assert edges["soft"][~across] == pytest.approx(np.array(ends) * 200.0 / 8.0 / 1897.4 * slant**2, rel=0.05)
 
 
 def test_a_box_ends_beams_and_its_light_is_left_to_photons() -> None:
