@@ -154,10 +154,9 @@ as texels (0.023, 0.019, 0.011, 0.025). Of the colour of 14 to 29 blocks' channe
 both (0.0065, 0.0055, 0.002, 0.034)."""
 
 
-SLOW = {"ball", "single wavelengths"}
-
-
-@pytest.mark.parametrize("case", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in CASES])
+# Slow as well for the paths that they are held against, which take half a minute to compile.
+@pytest.mark.slow
+@pytest.mark.parametrize("case", CASES)
 def test_blocks_agree_with_paths_of_single_wavelengths(gl: Context, case: str) -> None:
     scene, method, most, most_colour = CASES[case]
     light = found(gl, scene, 512, 0.5, method)
@@ -183,7 +182,8 @@ def test_only_dispersive_glass_has_it() -> None:
     assert not Features.of(plain, settings).environment_spectrum
 
 
-@pytest.mark.parametrize("method", ["srd", pytest.param("srd-photons", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["srd", "srd-photons"])
 def test_a_window_is_a_light_whose_caustic_is_that_of_single_wavelengths(gl: Context, method: str) -> None:
     """A narrow window's spectrum behind a prism, by beams and by photons, seen from straight above; what else arrives
     is that of a black prism."""

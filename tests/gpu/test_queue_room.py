@@ -44,7 +44,7 @@ def test_a_slice_that_overflows_is_traced_again_in_parts(gl, crowded: Scene, mon
     """Nothing is lost of what the queue had no room for, which is half of the flux."""
     # Pilots of so many orders would take most of the time.
     monkeypatch.setattr(pilot, "MAX_DEPTH", FEW)
-    monkeypatch.setattr(pilot, "PHOTONS", 512)
+    monkeypatch.setattr(pilot, "PHOTONS", 64)
     # With more a pool has what waits for its turn.
     monkeypatch.setattr(ray_pool, "RAY_ROOM", 1.0)
     with light_pass(gl, crowded, replace(SMALL, photons=2_560, batch=2_048, max_depth=FEW)) as (light, _):
