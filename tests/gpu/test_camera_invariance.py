@@ -28,9 +28,9 @@ from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.spectrum_choice import Spectrum
 from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.stress.rigs.gpu_paths import glass
+from spectrasplat.stress.rigs.scene_parts import moved
 
 from tests.gpu.camera_rig import WHITE, at, quad
-from tests.gpu.test_invariance import moved
 
 SIZE, SAMPLES, BANDS = (32, 20), 8, 4
 SAME_RAYS = 2e-3
@@ -92,27 +92,24 @@ def shown(gl) -> np.ndarray:
 
 
 def rotation() -> np.ndarray:
-    matrix = np.eye(4)
     turned = np.linalg.qr(np.array([[0.2, 1.0, -0.4], [0.9, -0.3, 0.1], [0.5, 0.3, 1.1]]))[0]
-    matrix[:3, :3] = turned * np.sign(np.linalg.det(turned))
-    return matrix
+    return turned * np.sign(np.linalg.det(turned))
 
 
 def test_everything_turned_together_looks_the_same(gl, shown) -> None:
     turn = rotation()
-    sky = Environment(pattern(), turn[:3, :3].T)
-    turned = picture(gl, replace(moved(scene(), turn), environment=sky))
-    assert difference(turned, shown) < SAME_RAYS
+    turned = moved(scene(), rotation=turn)
+    assert difference(picture(gl, turned), shown) < SAME_RAYS
     # The mutant: the sky stays where it was.
-    assert difference(picture(gl, moved(scene(), turn)), shown) > 50 * SAME_RAYS
+    assert difference(picture(gl, replace(turned, environment=scene().environment)), shown) > 50 * SAME_RAYS
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
 def test_units_do_not_matter(gl, shown, scale: float) -> None:
-    matrix = np.diag([scale, scale, scale, 1.0])
     # Radiance does not depend on the unit; intensity follows its square, which `moved` knows.
-    assert difference(picture(gl, moved(scene(), matrix)), shown) < SAME_RAYS
-    assert difference(picture(gl, moved(scene(), matrix, lights=False)), shown) > 10 * SAME_RAYS
+    larger = moved(scene(), scale)
+    assert difference(picture(gl, larger), shown) < SAME_RAYS
+    assert difference(picture(gl, replace(larger, lights=scene().lights)), shown) > 10 * SAME_RAYS
 
 
 def test_the_same_seed_gives_the_same_bits_in_any_portions(gl, shown) -> None:

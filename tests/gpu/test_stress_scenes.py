@@ -80,10 +80,11 @@ def test_a_pile_of_sixteen_keeps_its_light(gl) -> None:
     assert found.broken() == []
 
 
-def test_scale_holds(gl) -> None:
-    (found,) = swept("scale").only(1e-4).measure(gl)
+@pytest.mark.parametrize(("name", "severity", "most"), [("scale", 1e-4, 1e-3), ("rotation", 90.0, 0.014)])
+def test_scene_may_be_of_any_size_and_turned(gl, name: str, severity: float, most: float) -> None:
+    (found,) = swept(name).only(severity).measure(gl)
     assert found.broken() == []
-    assert found.errors["picture"] < 1e-3
+    assert found.errors["picture"] < most
 
 
 def test_passes_add_up(gl) -> None:
