@@ -28,16 +28,8 @@ def rotation_matrix(rotation_deg: Vec3) -> np.ndarray:
     return np.asarray(about[0] @ about[1] @ about[2], dtype=np.float64)
 
 
-def compose(position: Vec3, rotation_deg: Vec3, scale: Vec3) -> np.ndarray:
-    """The object-to-world matrix, float64 (4, 4): scale, then rotation, then position."""
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation_matrix(rotation_deg) * np.asarray(scale, dtype=np.float64)
-    matrix[:3, 3] = position
-    return matrix
-
-
 def decompose(matrix: np.ndarray) -> Placement:
-    """Position, rotation and scale of an object-to-world matrix: the inverse of `compose`.
+    """Position, rotation and scale of an object-to-world matrix, as a scene file gives them.
 
     Angles are in (-180, 180], that about y in [-90, 90]; at ±90 the angle about x is given as 0. A mirrored
     matrix gets a negative scale on the axis that leaves the smallest rotation. What shears cannot be expressed

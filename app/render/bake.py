@@ -46,17 +46,6 @@ def check_receiver(scene: Scene, name: str) -> None:
 
 
 @dataclass(frozen=True)
-class BakedMap:
-    """A receiver's map before it is written."""
-
-    picture: Picture
-    """Irradiance, see `UNITS`; row 0 on top."""
-    placement: Mapping[str, object]
-    photons: int
-    notices: list[str]
-
-
-@dataclass(frozen=True)
 class Drawn:
     """Pictures of the same settings, random numbers and texels; of a map the irradiance, see `UNITS`, row 0 on top."""
 

@@ -170,11 +170,6 @@ class EngineAnswers:
 
     # ---- the scene and its light -------------------------------------------------------------
 
-    @property
-    def live_light(self) -> LiveLight | None:
-        """The photons and beams of the picture; None before the first."""
-        return None if self._shown is None else self._shown.light
-
     def stored_photons(self, limit: int = QUERIED_PHOTONS) -> StoredPhotons | NotYet:
         """About `limit` stored photons in world space, as they are shown."""
         if self._shown is None or self._inputs is None or self._lacks_photons(self._shown.light):
