@@ -118,6 +118,8 @@ def test_light_traced_anew_takes_the_place_of_light_as_fine(gl: Context) -> None
         while engine._shown is traced:
             engine.advance(0.02)
             assert time.perf_counter() < deadline and (engine.stats.differs == "light") >= engine.schedule.building
+            if engine.schedule.splatting:  # what is seen is of before the edit
+                assert engine.stats.differs == "light" and not engine.stats.first_order
         assert engine._shown is not None and engine._shown.accumulation.finest == 1 << 14
         assert not engine.schedule.maps_are_coarse
     finally:

@@ -88,11 +88,19 @@ class EngineAnswers:
         """What of the wanted scene the picture does not show yet, as in `LiveStats`."""
         if self.schedule.moved and not self.schedule.building:
             return "moved"
+        if self._shows_former:
+            return "light"
         if self.schedule.splatting and not self.schedule.shows_preview and self._shown is not None:
-            return "" if self._shown.light.shows_outdated else "light"
+            return ""
         if self._wanted is None or not self.schedule.building:
             return ""
         return "scene" if self._level == DirtyLevel.BUILD else "light"
+
+    @property
+    def _shows_former(self) -> bool:
+        """The light of before an edit is seen until that of all stored photons takes its place."""
+        waits = self.schedule.splatting and not self.schedule.shows_preview
+        return waits and self._shown is not None and not self._shown.light.shows_outdated
 
     @property
     def is_busy(self) -> bool:
@@ -144,7 +152,7 @@ class EngineAnswers:
             splat_s=seconds["splat"] + seconds.get("beams", 0.0),  # apart only by the device's own timers
             camera_s=seconds["camera"],
             photons_per_second=self._tally.photons_per_second,
-            first_order=light.first_order,
+            first_order=light.first_order and not self._shows_former,
             converged=self.is_idle,
             bytes=light.bytes,
             fallbacks=dict(light_pass.stats.tally.fallbacks),
