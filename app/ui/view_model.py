@@ -169,3 +169,8 @@ class ViewModel:
     """Device pixels per interface pixel."""
     interface_scale: float = 1.0
     """Interface pixels per logical pixel: what `theme.apply` takes."""
+
+    def called(self, recent: Path) -> str:
+        """A recent file's name, with its folder where another one has the same."""
+        is_alone = sum(other.name == recent.name for other in self.recent) == 1
+        return recent.name if is_alone else f"{recent.name} ({recent.parent.name})"

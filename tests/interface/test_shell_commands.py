@@ -13,6 +13,7 @@ from spectrasplat.edit.state import Panels, Selection
 from spectrasplat.gpu.context import Context
 from spectrasplat.ui.commands import COMMANDS, PANELS, VIEWS
 from spectrasplat.ui.shortcuts import chord, listed
+from spectrasplat.ui.view_model import ViewModel
 
 from tests.interface.panel_rig import scene_state
 from tests.interface.shell_rig import ShellRig
@@ -219,6 +220,12 @@ def test_file_browser_opens_and_saves(rig: ShellRig, tmp_path: Path) -> None:
     rig.click("Replace")
     rig.frame(2)
     assert rig.asked == [requests.Save(tmp_path / "mine.toml")]
+
+
+def test_recent_files_of_one_name_are_told_apart_by_their_folders() -> None:
+    recent = Path("/a/first/prism.toml"), Path("/a/second/prism.toml"), Path("/a/second/ball.toml")
+    names = [ViewModel(recent=recent).called(path) for path in recent]
+    assert names == ["prism.toml (first)", "prism.toml (second)", "ball.toml"]
 
 
 def test_a_folder_that_cannot_be_read_is_said(rig: ShellRig, tmp_path: Path) -> None:

@@ -54,7 +54,7 @@ def _file(state: State, view_model: ViewModel) -> State:
     state = _items(("New scene", "Start page", "", "Open…"), state, view_model)
     if imgui.begin_menu("Open recent", bool(view_model.recent)):
         for path in view_model.recent:
-            if imgui.menu_item(f"{path.name}##{path}", "", False)[0]:
+            if imgui.menu_item(f"{view_model.called(path)}##{path}", "", False)[0]:
                 state = dialogs.open_path(state, view_model, path)
             widgets.tooltip(str(path))
         imgui.end_menu()

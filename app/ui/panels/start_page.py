@@ -87,7 +87,7 @@ def _side(state: State, view_model: ViewModel) -> State:
     if not view_model.recent:
         widgets.hint("Files that you open or save appear here.")
     for index, path in enumerate(view_model.recent):
-        pressed, _ = imgui.selectable(f"{path.name}##recent {index}", False)
+        pressed, _ = imgui.selectable(f"{view_model.called(path)}##recent {index}", False)
         item_rects.note(f"Recent: {path.name}")
         widgets.tooltip(str(path))
         if pressed:
