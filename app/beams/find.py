@@ -73,12 +73,14 @@ class Search:
     """Above 0: beams below the threshold end as `search.LEAF_TAIL`, and roulette is played below this share only."""
     most: int = 1 << 40
     """Leaves of one facet that the source sees: with more, a search is given up."""
+    hidden: frozenset[int] = frozenset()
+    """Objects that photons carry: what the source casts on them first is left out."""
 
 
 _Args = tuple[np.ndarray, ...]
 _Job = tuple[np.ndarray, np.ndarray]
 """NODE (1,) and WORK (1,)."""
-Found = tuple[list[Leaves], np.ndarray, set[int]]
+Found = tuple[list[Leaves], np.ndarray]
 
 
 def search(
@@ -87,10 +89,9 @@ def search(
     threads: int | None = None,
     go_on: GoOn = lambda steps: True,
 ) -> list[Found]:
-    """Follow beams of `sources`. Returns of each the leaves, in an order that depends on the scene alone, sums over all
-    of them (`search.SUM_…`), and objects that something not flat may hide, so that photons carry what this source
-    casts on them. `go_on` may end it early, where the result is not needed: every step is reported to it once, in any
-    order."""
+    """Follow beams of `sources`. Returns of each the leaves, in an order that depends on the scene alone, and sums over
+    all of them (`search.SUM_…`). `go_on` may end it early, where the result is not needed: every step is reported to it
+    once, in any order."""
     begun = [_begin(scene, emission, how) for emission, how in sources]
 
     def one(job: tuple[_Args, int, _Job]) -> Leaves:
@@ -119,52 +120,61 @@ def search(
         with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
             done = list(pool.map(one, jobs))
     leaves = iter(done)
-    return [
-        ([next(leaves) for _ in own], sums + sum(work["sums"][0] for _, work in own), blocked)
-        for _, own, sums, blocked in begun
-    ]
+    return [([next(leaves) for _ in own], sums + sum(work["sums"][0] for _, work in own)) for _, own, sums in begun]
 
 
-def _begin(scene: BeamScene, emission: Emission, how: Search) -> tuple[_Args, list[_Job], np.ndarray, set[int]]:
-    """What is followed from the facets that a source sees, with `sums` and objects as `search` returns them."""
-    sums = np.zeros(SUMS)
+def hidden_from(scene: BeamScene, emission: Emission) -> set[int]:
+    """Objects that something not flat may hide from a source."""
+    hidden: set[int] = set()
+    stack, args = take_stack(), _arguments(scene, emission)
+    work = _work(scene, emission, Search(1.0, 0, 0, 1.0), 1.0, 1)
+    for root in _roots(stack, (0.0, 1.0), emission, work.copy(), args):
+        facet = root["facet"][0]
+        owner = int(scene.facets["owner"][facet])
+        away = scene.facets["centre"][facet] - root["position"][0, 1, 0]
+        reach = float(scene.solids["radius"][owner] + np.linalg.norm(away))
+        if may_touch(root, 0, reach, scene.obstacles, work):
+            hidden.add(owner)
+    _stacks.append(stack)
+    return hidden
+
+
+def _arguments(scene: BeamScene, emission: Emission) -> _Args:
     tables = np.vstack([scene.tables, emission.power, emission.watts])
+    sources = np.concatenate([emission.source, *emission.shifted])
+    sources["polarised"] = scene.polarised
+    return scene.facets, scene.solids, tables, sources
+
+
+def _begin(scene: BeamScene, emission: Emission, how: Search) -> tuple[_Args, list[_Job], np.ndarray]:
+    """What is followed from the facets that a source sees, with `sums` as `search` returns them."""
+    sums, args = np.zeros(SUMS), _arguments(scene, emission)
     bands = [(x, x, share) for x, share in zip(emission.lines, emission.line_shares, strict=True)]
     if emission.is_continuous:
         # In one piece where nothing is coloured.
         bands += [(lo, hi, 1.0) for lo, hi in pairwise(emission.edges)]
-    sources = np.concatenate([emission.source, *emission.shifted])
-    sources["polarised"] = scene.polarised
-    args = scene.facets, scene.solids, tables, sources
-    starts: list[tuple[int, np.ndarray, np.ndarray]] = []
-    blocked: set[int] = set()
+    jobs: list[_Job] = []
     stack = take_stack()
     for lo, hi, share in bands:
-        work = _work(scene, emission, how, share, len(sources))
+        work = _work(scene, emission, how, share, 1 + len(emission.shifted))
         for root in _roots(stack, (lo, hi), emission, work.copy(), args):
-            facet = root["facet"][0]
-            if scene.facets["kind"][facet] not in (DIELECTRIC, MIRROR):
+            facet = scene.facets[root["facet"][0]]
+            if facet["kind"] not in (DIELECTRIC, MIRROR) or int(facet["owner"]) in how.hidden:
                 continue
-            owner = int(scene.facets["owner"][facet])
-            if len(scene.obstacles):
-                away = scene.facets["centre"][facet] - root["position"][0, 1, 0]
-                reach = float(scene.solids["radius"][owner] + np.linalg.norm(away))
-                if may_touch(root, 0, reach, scene.obstacles, work):
-                    blocked.add(owner)
             if emission.source["kind"][0] != PARALLEL:
                 root["weight"] = _mean_weight(root[0], emission.source)
-            starts.append((owner, root, work.copy()))
+            jobs.append((root, work.copy()))
     _stacks.append(stack)
-    jobs = [(root, work) for owner, root, work in starts if owner not in blocked]
+    tables = args[2]
     sums[SUM_ENTERED] = sum(flux_in(root, 0, tables, work) for root, work in jobs)
     entered = sum(power_of(root, 0, tables, work) for root, work in jobs)
     if not jobs or entered <= 0.0:
-        return args, [], sums, blocked
+        return args, [], sums
     relative = entered if how.power is None else math.sqrt(entered * how.power)
     for _, work in jobs:
         work["threshold"] = threshold = _rounded(how.threshold * relative)
         work["faint"] = how.faint / how.threshold * threshold
-    return args, jobs, sums, blocked
+    return args, jobs, sums
 
 
 def _rounded(threshold: float) -> float:

@@ -16,7 +16,7 @@ from ..model.optics.spectral_tables import SpectralAxis
 from ..model.scene import Scene
 from .convert import pieces_of, polygons_of
 from .facets import beam_scene, in_gpu_space, shown_as
-from .find import Emission, GoOn, Search, search
+from .find import Emission, GoOn, Search, hidden_from, search
 from .leaves import Leaves
 from .polygons import WIDE, BeamPieces, BeamPolygons, joined
 from .search import SUM_BEAMS, SUMS
@@ -24,6 +24,9 @@ from .sources import emissions, is_near_facets, mask_at, why_no_beams
 
 LIGHT_PARTS = 16, 32, 64
 """Points that represent an extended light, of which one is chosen (`parts_for`); penumbrae blur each into the next."""
+
+SURVEY_PARTS, MOVING_PARTS = 4, 1
+"""Points that represent it in a survey, and in motion."""
 
 
 @dataclass
@@ -66,6 +69,7 @@ class BeamFinder:
         lights = enumerate(scene.lights)
         self._near = frozenset(i for i, light in lights if is_near_facets(light, self.scene, to_gpu, unit))
         """Lamps too near to facets."""
+        self._hidden: dict[int, frozenset[int]] = {}
         self.set_texels(texels)
 
     def set_texels(self, texels: dict[int, float]) -> None:
@@ -120,16 +124,7 @@ class BeamFinder:
         photons, unless its light has both emission lines and a continuum; `depth`: most specular events; `light_parts`:
         points of an extended light."""
         beams, scene, texel = self.scene, self._scene, self._texel
-        todo: list[tuple[int, list[Emission]]] = []
-        for i in self.lights:
-            light = scene.lights[i]
-            place = 0
-            if light.has_place and not light.is_parallel:
-                place = mask_at(self._to_gpu(np.array(light.position)), beams, self.meshes)
-            count = light_parts if light.has_extent else 1
-            parts = emissions(light, beams, self._to_gpu, self._unit, self._axis, count, place, self._bins)
-            if parts:
-                todo.append((i, parts))
+        todo = [(i, parts) for i in self.lights if (parts := self._parts(i, light_parts))]
         watts = {i: _power(scene.lights[i]) for i, _ in todo}
         reach = {i: sum(_reach(part) for part in parts) * watts[i] for i, parts in todo}
         total, steps = sum(reach.values()), sum(len(parts) for _, parts in todo)
@@ -138,7 +133,7 @@ class BeamFinder:
         result, done = LightBeams({}, plays=plays), 0
         polygons, pieces = [], []
         for i, parts in todo:
-            sums, blocked = np.zeros(SUMS), set()
+            sums, hidden = np.zeros(SUMS), self._hidden_from(i)
             cast: list[BeamPolygons] = []
             left: list[BeamPieces] = []
             leaves: list[Leaves] = []
@@ -153,6 +148,7 @@ class BeamFinder:
                         _TOLERANCE * texel,
                         power=total / watts[i] if watts[i] > 0.0 else None,
                         faint=0.0 if i in plays else _TAILS_PLAY * threshold,
+                        hidden=hidden,
                     ),
                 )
                 for number, part in enumerate(parts)
@@ -160,10 +156,9 @@ class BeamFinder:
             searched = (
                 search(beams, sources[k : k + _AT_ONCE], threads, go_on) for k in range(0, len(parts), _AT_ONCE)
             )
-            for found, part_sums, part_blocked in chain.from_iterable(searched):
+            for found, part_sums in chain.from_iterable(searched):
                 leaves += found
                 sums += part_sums
-                blocked |= part_blocked
                 done += 1
                 if sum(len(some.leaf) for some in leaves) > _TOGETHER:
                     cast.append(polygons_of(leaves, beams, i, self._unit))
@@ -172,17 +167,30 @@ class BeamFinder:
                 yield done / steps
             cast.append(polygons_of(leaves, beams, i, self._unit))
             left.append(pieces_of(leaves, beams, i, measure))
-            if blocked:
-                # Photons carry what these objects cast: all of it, whichever point of the light it comes from.
-                cast = [some.where(~np.isin(some.source, list(blocked))) for some in cast]
-                left = [some.where(~np.isin(some.source, list(blocked))) for some in left]
             polygons += cast
             pieces += left
-            result.carried[i] = tuple(o for o in beams.beam_objects if o not in blocked)
+            result.carried[i] = tuple(o for o in beams.beam_objects if o not in hidden)
             result.sums[i] = sums
         result.polygons = joined(polygons) if polygons else None
         result.pieces = joined(pieces) if pieces else None
         return result
+
+    def _parts(self, i: int, count: int) -> list[Emission]:
+        """A light as sources, as about `count` where it has an extent."""
+        light, beams, place = self._scene.lights[i], self.scene, 0
+        if light.has_place and not light.is_parallel:
+            place = mask_at(self._to_gpu(np.array(light.position)), beams, self.meshes)
+        count = count if light.has_extent else 1
+        return emissions(light, beams, self._to_gpu, self._unit, self._axis, count, place, self._bins)
+
+    def _hidden_from(self, i: int) -> frozenset[int]:
+        """Objects that something not flat may hide from any point of a light, however many represent it: photons carry
+        all that it casts on them, whatever search is drawn."""
+        if i not in self._hidden:
+            counts = (MOVING_PARTS, SURVEY_PARTS, *LIGHT_PARTS) if len(self.scene.obstacles) else ()
+            parts = chain.from_iterable(self._parts(i, count) for count in counts)
+            self._hidden[i] = frozenset().union(*(hidden_from(self.scene, part) for part in parts))
+        return self._hidden[i]
 
 
 def parts_for(polygons: BeamPolygons, watts: np.ndarray, parts: int) -> int:

@@ -15,7 +15,7 @@ from functools import partial
 import numpy as np
 
 from ..base.generators import finished, mapped, timed
-from ..beams.light_beams import LIGHT_PARTS, BeamFinder, LightBeams, parts_for
+from ..beams.light_beams import LIGHT_PARTS, MOVING_PARTS, SURVEY_PARTS, BeamFinder, LightBeams, parts_for
 from ..beams.polygons import BeamPolygons
 from ..beams.search import (
     SUM_ABSORBED,
@@ -101,9 +101,6 @@ class BeamStats:
         setattr(self, name, getattr(self, name) + seconds)
 
 
-SURVEY_PARTS = 4
-MOVING_PARTS = 1
-"""Points that represent an extended light in motion."""
 _MOVING_WORD = 1
 """Roulette's seed in motion: the same beams from frame to frame."""
 

@@ -102,8 +102,7 @@ class Rig:
     def find(self, emission: Emission, threshold: float, seed: int = 1, depth: int = 64, drift: float = 1.0):
         """(leaves, sums) of one source."""
         how = Search(threshold, seed, depth, 0.25 * self.texel, drift)
-        [(leaves, sums, blocked)] = search(self.beams, [(emission, how)], 2)
-        assert not blocked
+        [(leaves, sums)] = search(self.beams, [(emission, how)], 2)
         return leaves, sums
 
     def polygons(self, emission: Emission, threshold: float, seed: int = 1, depth: int = 64, drift: float = 1.0):

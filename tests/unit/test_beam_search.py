@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from reference.beam_scenes import PRISM, lamp
 from reference.beam_worlds import Rig, scene_of
+from spectrasplat.base.generators import finished
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
 from spectrasplat.beams.leaves import Leaves
+from spectrasplat.beams.light_beams import BeamFinder
 from spectrasplat.beams.search import LEAF_PIECE, LEAF_RECEIVER, NARROWEST, SUM_ENTERED, SUM_ROULETTE
 from spectrasplat.beams.sources import RIM, _places, emissions
 from spectrasplat.model.io.scene_file import load_scene
@@ -37,8 +39,7 @@ def stone() -> tuple[BeamScene, Emission]:
 
 def fluxes(stone: tuple[BeamScene, Emission], seed: int, threads: int) -> tuple[np.ndarray, np.ndarray]:
     beams, emission = stone
-    [(leaves, sums, blocked)] = search(beams, [(emission, Search(1e-3, seed, 96, 1e-3))], threads)
-    assert not blocked
+    [(leaves, sums)] = search(beams, [(emission, Search(1e-3, seed, 96, 1e-3))], threads)
     return np.concatenate([part.leaf["flux"] for part in leaves]), sums
 
 
@@ -249,6 +250,25 @@ def test_penumbrae_of_a_far_window_are_as_wide_as_it_is_seen(text: str, middle: 
     assert len(parts) == 16 and across.any() and not across.all()
     assert edges["soft"][across] == pytest.approx(middle * 10.0 / 1897.4 * slant, rel=0.05)
     assert edges["soft"][~across] == pytest.approx(np.array(ends) * 200.0 / 8.0 / 1897.4 * slant**2, rel=0.05)
+
+
+BALL_BEFORE_PANE = """
+[[objects]]
+name = "ball"
+shape = "sphere"
+radius = 0.03
+position = [0.7, 0.0, 2.5]
+glass = "N-BK7"
+"""
+
+
+def test_what_a_ball_hides_from_some_points_of_a_lamp_is_left_to_photons_by_every_search() -> None:
+    """Photons leave out what the survey's few points see past the ball; of more points some did not, and all that their
+    search found was dropped: 13 % of the light of a lens and a step cut under a lamp."""
+    rig = Rig(scene_of(lamp((0.0, 0.0, 4.0), (0.0, 0.0, -1.0), (2.0, 2.0), "area") + PANE_ABOVE + BALL_BEFORE_PANE))
+    finder = BeamFinder(rig.scene, rig.meshes, {}, {}, rig.axis, lambda p: np.asarray(p, float), 1.0)
+    found = {count: finished(finder.find(1e-2, 16, 1, count)) for count in (4, 16)}
+    assert found[4].carried == found[16].carried == {0: ()}
 
 
 def test_a_box_ends_beams_and_its_light_is_left_to_photons() -> None:

@@ -258,7 +258,7 @@ def kept(
     total, bad, count = np.zeros(SUM_ENTERED + 1), 0, 0
     for emission in emissions(light, beams, lambda p: np.asarray(p, float), 1.0, axis, 1):
         lines = replace(emission, lines=LINES, line_shares=(1.0,) * len(LINES), is_continuous=False)
-        [(leaves, sums, _)] = search(beams, [(lines, Search(1e-5, 1, 64, 1e-3))])
+        [(leaves, sums)] = search(beams, [(lines, Search(1e-5, 1, 64, 1e-3))])
         polygons = polygons_of(leaves, beams, 0, 1.0)
         bad += not_finite((polygons.edges, polygons.density, polygons.hulls))
         total, count = total + sums[: SUM_ENTERED + 1], count + len(polygons)
