@@ -15,6 +15,7 @@ from spectrasplat.__main__ import main
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.model.gems import paths as gem_paths
+from spectrasplat.model.gems import report
 from spectrasplat.model.gems.figures import UP, face_places, figures, look, seen_mean, stone_of, tilted
 from spectrasplat.model.gems.report import TILTS_DEG, gem_report, shown
 from spectrasplat.model.geometry.mesh import Mesh, make_mesh
@@ -24,6 +25,12 @@ from spectrasplat.model.optics import catalogue, glass
 from spectrasplat.model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 
 DIAMOND = catalogue.find("diamond")
+SIDE = 64
+
+
+@pytest.fixture(autouse=True)
+def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(report, "SIDE", SIDE)
 
 
 def turned_prism(n: float):
@@ -136,7 +143,7 @@ def test_a_round_stone_s_curves_are_even() -> None:
         assert curves.shape == (2, len(TILTS_DEG))
         assert np.abs(curves - curves[:, ::-1]).max() < 5e-3 and np.abs(curves[0] - curves[1]).max() < 5e-3
     aset = found.pictures["aset"]
-    assert aset.shape == (512, 512, 3) and np.abs(aset - aset[::-1]).mean() < 5e-3
+    assert aset.shape == (SIDE, SIDE, 3) and np.abs(aset - aset[::-1]).mean() < 5e-3
     assert found.rows()[0][0] == "ISO" and json.dumps(found.values(), allow_nan=False)
 
 
