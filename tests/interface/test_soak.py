@@ -90,11 +90,6 @@ def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.mark.slow
-def test_80_random_actions(gl: Context, own_folder: Path) -> None:
-    soak(gl, own_folder, 80, seed=1)
-
-
-@pytest.mark.slow
 def test_2000_random_actions(gl: Context, own_folder: Path) -> None:
     soak(gl, own_folder, 2000, seed=2)
 
