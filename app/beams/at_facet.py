@@ -42,6 +42,9 @@ from .search import (
 
 _GRAZING = 1e-9
 """Squared cosines of transmission smaller than this may have either sign: total reflection is just setting in."""
+_FADES = 0.3
+"""Of the shares that pass a facet at the places of a band, the least by the most: below, rays that diverge are far from
+affine there, and from one place of the band to the next. The share rises as the root of the way from the onset."""
 
 
 @part
@@ -91,13 +94,19 @@ def at_facet(nodes, facets, solids, tables, sources, work):
         unknown = not same and beam.total == UNKNOWN
         if unknown and total_from(nodes, before, after, facets, solids, tables, sources, work):
             return
-    work.sums[SUM_ABSORBED] += (1.0 - passed) * flux_of(beam, tables, work)
     for turn in range(2):
         # A single call of `child` for all cases, since `child` is long and might be compiled into each call.
-        action = PASS if same else (REFLECT if turn == 0 else REFRACT)
-        if turn == 1 and (same or facet.kind == 1 or beam.total == ALL):
+        action = PASS if same else (REFRACT if turn == 0 else REFLECT)
+        if action == REFRACT and (facet.kind == 1 or beam.total == ALL):
+            continue
+        behind = beam.mask if action == REFLECT else mask
+        if child(nodes, action, before, after, behind, not is_parallel, facets, solids, tables, work):
+            beam.ends = LEAF_TAIL
+            push_both(nodes, True, False, work)
+            return
+        if same:
             break
-        child(nodes, action, before, after, beam.mask if action == REFLECT else mask, facets, solids, tables, work)
+    work.sums[SUM_ABSORBED] += (1.0 - passed) * flux_of(beam, tables, work)
 
 
 @part
@@ -147,8 +156,7 @@ def total_from(nodes, before, after, facets, solids, tables, sources, work):
     beam.path[flight, 2], beam.path[flight, 3] = before, after
     for a in range(first_place(beam), last_place(beam)):
         total_line(facet, tables, before, after, beam.x[a], beam.direction[a], beam.centre[0], beam.centre[1], lines[a])
-        # Penumbrae of what exists at one end alone are wider than it: an extended light's is looked at in the middle.
-        for c in range(beam.corners[a] if a == 1 or work.sources == 1 else 0):
+        for c in range(beam.corners[a]):
             value = lines[a, 0] + lines[a, 1] * beam.corner[a, c, 0] + lines[a, 2] * beam.corner[a, c, 1]
             least, most = min(least, value), max(most, value)
     if not (least < -_GRAZING and most > _GRAZING):
@@ -174,8 +182,11 @@ def total_from(nodes, before, after, facets, solids, tables, sources, work):
 
 
 @part
-def child(nodes, action, before, after, mask, facets, solids, tables, work):
-    """Push the current beam's child that takes `action` at the facet, unless it is too deep or roulette ends it."""
+def child(nodes, action, before, after, mask, diverges, facets, solids, tables, work):
+    """Push the current beam's child that takes `action` at the facet, unless it is too deep or roulette ends it.
+    Returns whether photons must take the beam itself to the facet instead: what refracts would be left to them, and
+    next to the onset of total reflection its rays (which may all be behind it at a place of the band) say too little
+    of where they go."""
     beam, new = nodes[CURRENT], nodes[work.top]
     flight = beam.flight
     depth = beam.depth + (0 if action == PASS else 1)
@@ -183,27 +194,32 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
     row, inside = new.path[flight], medium(solids, beam.mask)
     row[0], row[1], row[2], row[3] = beam.facet, action, before, after
     row[4] = solids[inside].tint if inside >= 0 else -1
+    least, most = 1e300, 0.0
     for a in range(first_place(beam), last_place(beam)):
-        new.weight[a] *= meet(
+        share = meet(
             facets, solids, tables, new.path, flight, new.x[a], new.position[a], new.direction[a], new.state[a]
         )
+        new.weight[a] *= share
+        least, most = min(least, share), max(most, share)
     new.flight, new.depth, new.mask = flight + 1, depth, mask
     new.facet, new.total = -1, UNKNOWN
     new.key = mixed(beam.key, 3 + action)
     if depth > work.depth or flight >= LEVELS - 2:
         work.sums[SUM_DEPTH] += flux_as(beam, new, tables, work)
-        return
+        return False
     power = power_as(beam, new, tables, work)
     if power <= 0.0:
-        return
+        return False
     as_tail = power < work.threshold and work.faint > 0.0
+    if as_tail and diverges and action == REFRACT and least <= _FADES * most and beam.depth > 0:
+        return True
     limit = work.faint if as_tail else work.threshold
     if power < limit:
         chance = power / limit
         flux = flux_as(beam, new, tables, work)
         if unit(mixed(new.key ^ work.seed, np.int64(17))) >= chance:
             work.sums[SUM_ROULETTE] += flux
-            return
+            return False
         new.boost /= chance
         work.sums[SUM_ROULETTE] -= flux * (1.0 / chance - 1.0)
     if as_tail:
@@ -212,3 +228,4 @@ def child(nodes, action, before, after, mask, facets, solids, tables, work):
         work.sums[SUM_BEAMS] += 1.0
     copy_outline(beam, new)
     work.top += 1
+    return False

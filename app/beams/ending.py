@@ -7,7 +7,7 @@ import numpy as np
 from .compiling import part
 from .current import CURRENT, FAINT, SPARE, halve, push_both
 from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
-from .nodes import HALF, LINES, STATIC, area_of, copy, first_place, last_place, lay_out
+from .nodes import LINES, STATIC, area_of, copy, first_place, last_place, lay_out
 from .rays import PARALLEL, REFLECT
 from .search import (
     LEAF_RECEIVER,
@@ -334,7 +334,8 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
 
     The light's part is a disc whose radius is the way to those points. An edge's cover over it rises as the disc's
     cumulative profile; a ramp of the same variance is sqrt(3)/2 of the disc's projected radius wide to each side.
-    Where a beam was cut in halves nothing ends: of every point's light either half has what lands on its side."""
+    Where a beam was cut in halves nothing ends: of every point's light either half has what lands on its side. Nor does
+    it at the onset of total reflection, where all is reflected on either side, and what passes goes to the horizon."""
     beam, spare = nodes[CURRENT], nodes[SPARE]
     first, n = work.count[1], nodes[CURRENT].lines
     soft, own = work.soft, work.own
@@ -353,7 +354,7 @@ def soften(nodes, kind, facets, solids, tables, sources, leaf, edge, corner, wor
             elif kind == LEAF_RECEIVER and is_of_last(beam, ln):
                 moved = moves(beam, spare, ln, facets, work)
                 soft[ln] += moved * moved
-            elif beam.made[ln, 2] != HALF and (beam.made[ln, 2] != STATIC or kind == LEAF_RECEIVER):
+            elif beam.made[ln, 2] >= 0 or (beam.made[ln, 2] == STATIC and kind == LEAF_RECEIVER):
                 soft[ln] += (at - own[ln]) * (at - own[ln])
     lay_leaf(beam, facets, kind, leaf, edge, corner, work)
     new.slope[0], new.slope[1] = slope_u, slope_v
