@@ -67,8 +67,8 @@ LEAST_KEPT = 0.25
 """Least share of a narrow polygon's light that one mask keeps: about half of what is at a mask is inside."""
 BROAD = 4.0
 """Texels that a penumbra keeps at least where it is drawn in a map of wider ones."""
-LEAST_SIZE = 1.0 / 32.0
-"""Texels from a polygon's middle to its edges that it is drawn with at least: of much smaller ones float32 cannot tell
+LEAST_SIZE = 1.0 / 8.0
+"""Windows from a polygon's middle to its edges that it is drawn with at least: of much smaller ones float32 cannot tell
 the area."""
 
 
@@ -248,7 +248,9 @@ def packed(
             int(kind // 2),
             bool(kind % 2),
             data.reshape(-1, per_row, texels, 4),
-            *_filled(*_rows_of(hulls, hull_first, of_kind), (widest + 4.0 * LEAST_SIZE * (growth > 1.0))[of_kind]),
+            *_filled(
+                *_rows_of(hulls, hull_first, of_kind), (widest * (1.0 + 4.0 * LEAST_SIZE * (growth > 1.0)))[of_kind]
+            ),
         )
 
 
@@ -290,7 +292,8 @@ def _grow_tiny(lines: np.ndarray, first: np.ndarray, owner: np.ndarray, area: np
     inside = np.sum(a * middle[owner], axis=-1) + c
     reach = np.maximum(np.maximum.reduceat(inside.max(axis=1), first), 1e-30)
     # A sliver's lines are all near to its middle, not its corners.
-    growth = np.maximum(LEAST_SIZE / np.maximum(reach, area / (np.pi * reach)), 1.0)
+    _, _, window, _ = _windows_as_they_are(lines[..., 3], first)
+    growth = np.maximum(LEAST_SIZE * window / np.maximum(reach, area / (np.pi * reach)), 1.0)
     lines[..., 2] += (growth[owner, None] - 1.0) * inside
     return growth
 
