@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,6 +31,10 @@ MAX_DEPTH = 12
 on its way then."""
 RIM = ((1.0, 0.5), (0.5, 1.0))
 """Places on an extended light, its middle being (0.5, 0.5)."""
+OTHER_SIDES = ((0.0, 0.5), (0.5, 0.0), (0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
+"""Further ones, of a light whose middle does not speak for the rest."""
+PARTED = 0.1
+"""Share of light that goes another way from a light's rim than from its middle, from which on the middle does not."""
 BAND_TOLERANCE = 0.2
 """In no channel may a chord miss the true path by more than this share of its photon's own footprint (root mean square
 over the channel's light), and by less where that is narrower than half a pixel: a miss is then what is left of a
@@ -72,6 +77,9 @@ FEWEST_COVERED = 14.0
 are then as broad as its light, and copies only distinguish that from a disc's."""
 MAX_POINTS = 1 << 16
 """Lattice points of a pilot, however little of the domain holds glass."""
+PARTED_COPIES = 12.0
+"""Points on a light all of whose light parts, for each root of photons in `MIN_LATTICE`: both what a lattice blurs and
+what lies between two points then shrink with more photons."""
 MIN_LATTICE = 1024
 """Points a sub-lattice keeps, however many an extended light would like: with fewer, surfaces are not straight any more
 over a footprint."""
@@ -87,11 +95,17 @@ class Pilot:
     spectral: list[np.ndarray]
     """One at each of `PLACES` (empty where nothing disperses)."""
     rim: list[np.ndarray]
-    """One from each of `RIM` (empty for a light without extent)."""
+    """One from each of `RIM`, and of `OTHER_SIDES` where light parts (empty for a light without extent)."""
     flights: tuple[int, ...] = (0,) * (1 + len(KEPT_THRESHOLDS))
     """Flights of all rays of `whole`, as roulette is played by default, and with each of `KEPT_THRESHOLDS`."""
     fullness: tuple[float, ...] = (0.0,) * len(KEPT_THRESHOLDS)
     """Largest share of the queues' room with each of `KEPT_THRESHOLDS`."""
+
+    @cached_property
+    def parted(self) -> float:
+        """Share of the light that comes another way, or to another receiver, from the light's rim than from its middle,
+        or only from one of the two: the most of any place there."""
+        return max((_parted(self.whole, record) for record in self.rim), default=0.0)
 
 
 def pilot_steps(
@@ -145,13 +159,18 @@ def pilot_steps(
         _, _, some, full = yield from traced(everything, depth, split_threshold=threshold, every=_FLIGHTS_OF_EVERY)
         kept.append(some * _FLIGHTS_OF_EVERY)
         fullness.append(full)
-    at_places, from_rim = [], []
+    at_places: list[np.ndarray] = []
+    from_rim: list[np.ndarray] = []
     for x in (PLACES[:: len(PLACES) - 1] if for_maps else PLACES) if spectral else ():
         record, *_ = yield from traced(Band(x, x, x, power_w), depth)
         at_places.append(record)
-    for place in RIM if scene.lights[light].has_extent else ():
+    for place in RIM + OTHER_SIDES if scene.lights[light].has_extent else ():
+        if len(from_rim) == len(RIM) and max(_parted(whole, record) for record in from_rim) < PARTED:
+            break
         record, *_ = yield from traced(everything, depth, place)
         from_rim.append(record)
+    if not len(whole) and from_rim:  # something hides the glass from the light's middle
+        whole = max(from_rim, key=len)
     return Pilot(count, whole, at_places, from_rim, (flights, *kept), tuple(fullness))
 
 
@@ -277,7 +296,15 @@ class PilotFit:
         return min(TINT_TOLERANCE * max(1.0, (2.0 * self._broad_texels(1)) ** 3), COARSEST_TINTS)
 
     def light_points(self, bands: int) -> int:
-        """Points on an extended light so that footprints just bridge the copies they make."""
+        """Points on an extended light that see all ways that its light takes, and whose copies footprints bridge."""
+        points = self._bridged_points(bands)
+        if self.pilot.parted >= PARTED:
+            lattices = max(self.budget, 1) / (bands * MIN_LATTICE)
+            points = max(points, int(PARTED_COPIES * self.pilot.parted * lattices**0.5), 2)
+        return min(points + (points > 1) * points % 2, MAX_LIGHT_POINTS)  # each with its mirror image: lib/lattice.glsl
+
+    def _bridged_points(self, bands: int) -> int:
+        """So many that footprints just bridge the copies they make; 1 where copies would blur more than they part."""
         whole = self.pilot.whole
         shifts, weights = [], []
         for record in self.pilot.rim:
@@ -297,7 +324,7 @@ class PilotFit:
         count = int(min(np.ceil(copies), MAX_LIGHT_POINTS, self.budget // (bands * MIN_LATTICE)))
         if min(copies, count) < (FEWEST_COVERED if self.lamp_columns else FEWEST_COPIES):
             return 1
-        return count + count % 2  # each with its mirror image: lib/lattice.glsl
+        return count
 
     def _coarsening(self, lattices: int) -> float:
         """Spacing of a sub-lattice of the pass over that of the pilot."""
@@ -340,6 +367,15 @@ def same_paths(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     _, in_a, in_b = np.intersect1d(keys(a), keys(b), return_indices=True)
     same = a["receiver"][in_a] == b["receiver"][in_b]
     return a[in_a[same]], b[in_b[same]]
+
+
+def _parted(middle: np.ndarray, rim: np.ndarray) -> float:
+    """`Pilot.parted` of two traces of the same lattice."""
+    both = np.concatenate([middle, rim])
+    _, way = np.unique(both[["branch_key", "receiver"]], return_inverse=True)
+    flux_w = both["flux_w"].astype(float)
+    sign = np.repeat((1.0, -1.0), (len(middle), len(rim)))
+    return float(np.abs(np.bincount(way, sign * flux_w)).sum() / flux_w.sum()) if flux_w.any() else 1.0
 
 
 def lobe_part(paths: float) -> float:

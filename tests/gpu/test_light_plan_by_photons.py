@@ -18,6 +18,8 @@ from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.light_pass import LightPass
 from spectrasplat.render.light_plan import Division
 
+from tests.reference.beam_worlds import scene_of
+
 SETTINGS = RenderSettings(120, 68, method="srd-photons", layer="caustic")
 
 
@@ -110,3 +112,52 @@ def test_weak_branches_that_the_queues_have_no_room_for_play_roulette(
 def test_frames_that_share_their_lattices_play_roulette_alike(gl: Context) -> None:
     light = prepared(gl, "prism_case", Division({0: (6, 1)}))
     assert light.trace.split_threshold == SPLIT_THRESHOLD
+
+
+STRIP = """
+[[lights]]
+kind = "area"
+position = [0.0, 0.0, 2.0]
+direction = [0.0, 0.0, -1.0]
+tangent = [1.0, 0.0, 0.0]
+size = [4.0, 0.02]
+flux_w = 1.0
+
+[[objects]]
+shape = "slab"
+width = 0.5
+height = 0.5
+thickness = 0.002
+position = [0.0, 0.0, 1.0]
+material = {{ n_d = 1.0 }}
+
+[[objects]]
+shape = "plane"
+width = {shade}
+height = 9.0
+position = [0.0, 0.0, 1.5]
+material = "diffuse"
+"""
+
+
+@pytest.mark.parametrize("shade", [0.001, 0.6], ids=["bare", "its middle hidden"])
+def test_few_photons_of_a_lamp_much_wider_than_the_glass_hold_its_light(gl: Context, shade: float) -> None:
+    """A strip 4 long and 0.02 wide, 1 above a pane of 0.5 that does not refract: Lambert's law for each point of the
+    strip that sees a point of the pane past a shade halfway. Light from the middle alone would be 2.5 times as much,
+    or none. Noticed are 5 % too much or too little."""
+    scene = scene_of(STRIP.format(shade=shade), floor_z=0.9)
+    buffers = scene_buffers(gl, scene, SETTINGS)
+    light = LightPass(gl, scene, SETTINGS, buffers.features, buffers)
+    light.prepare()
+    strip, pane = np.linspace(-2.0, 2.0, 401)[:, None, None], np.linspace(-0.25, 0.25, 51)
+    beside = np.hypot(strip - pane[:, None], pane)
+    seen = np.abs(strip + pane[:, None]) > shade
+    expected = 0.25 * (seen / (np.pi * (1.0 + beside**2) ** 2)).mean()
+    photons, landed = 20_000, []
+    for seed in range(12):
+        light.begin(photons, seed)
+        for _ in light.pass_steps(0, photons):
+            pass
+        landed.append(light.stats.tally.ended["deposited"] / photons)
+    light.release()
+    assert np.mean(landed) == pytest.approx(expected, rel=0.05)
