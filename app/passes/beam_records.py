@@ -67,6 +67,8 @@ LEAST_KEPT = 0.25
 """Least share of a narrow polygon's light that one mask keeps: about half of what is at a mask is inside."""
 BROAD = 4.0
 """Texels that a penumbra keeps at least where it is drawn in a map of wider ones."""
+MASKED = 8.0
+"""How many times sharper than its penumbrae a narrow polygon's mask is drawn at least."""
 LEAST_SIZE = 1.0 / 8.0
 """Windows from a polygon's middle to its edges that it is drawn with at least: of much smaller ones float32 cannot tell
 the area."""
@@ -153,7 +155,8 @@ def hull_areas(hulls: np.ndarray, first: np.ndarray) -> np.ndarray:
 def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap) -> np.ndarray:
     """int64 (n,): how many times the texels may double for each of the `chosen`, since its penumbrae are broad.
 
-    A polygon far narrower than its penumbrae shows their mean only; of another the sharpest edge counts."""
+    A polygon far narrower than its penumbrae shows their mean only, and where a mask cuts it how much of them it
+    keeps; of another the sharpest edge counts."""
     rows, counts = ragged(polygons.edge_start, chosen)
     first = np.cumsum(counts) - counts
     density = to_texels.density(polygons.centre[chosen])
@@ -162,7 +165,8 @@ def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap) -> n
     area = polygons.area[chosen] * density
     sharpest = np.minimum.reduceat(windows.min(axis=1), first)
     is_masked = np.logical_or.reduceat(is_mask, first)
-    window = np.where((np.sqrt(area) < WIDE * widest) & ~is_masked, mean, sharpest)
+    shown = np.where(is_masked, np.maximum(mean / MASKED, sharpest), mean)
+    window = np.where(np.sqrt(area) < WIDE * widest, shown, sharpest)
     return np.maximum(np.floor(np.log2(window / BROAD)), 0.0).astype(np.int64)
 
 

@@ -18,8 +18,10 @@ from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import NONE, RECEIVER
 from spectrasplat.gpu.tiles import pack
 from spectrasplat.model.optics import spectrum
+from spectrasplat.passes.beam_records import levels
 from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
 from spectrasplat.passes.map_layout import MapLayout
+from spectrasplat.passes.texel_map import TexelMap
 
 BAND = 0.25, 0.5
 W = 3
@@ -290,3 +292,13 @@ def test_broad_penumbrae_go_to_wider_texels_with_all_their_light(gl) -> None:
             expected[level] = side * side
             assert held == pytest.approx(expected.tolist(), rel=1e-3, abs=1e-6), (softness, side)
     atlas.release()
+
+
+def test_a_mask_asks_for_texels_an_eighth_as_wide_as_a_narrow_polygon_s_penumbrae(rig: BeamRig) -> None:
+    """What stands before a mask's line fills no map at the finest: a picture of haze was drawn forty times as long."""
+    to_texels = TexelMap.of(rig.layout.placements[0], PLANE)
+    narrow, wide = (soft(polygon(regular(4, (32.0, 32.0), side, 0.3)), 40.0) for side in (0.5, 400.0))
+    for one, is_masked, level in ((narrow, False, 4), (narrow, True, 1), (wide, True, 0)):
+        edges = one.edges.copy()
+        edges[:1, [3, 7]] = -0.1 if is_masked else 40.0
+        assert levels(replace(one, edges=edges), np.arange(1), to_texels).tolist() == [level], (is_masked, level)
