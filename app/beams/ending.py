@@ -224,6 +224,8 @@ def hold_in(beam, facets, solids, tables, source, work):
             beam.lines += 1
     if beam.lines > before:
         lay_out(beam, facets, solids, tables, source, work)
+        if work.absorbing:
+            absorb(beam, facets, solids, tables, work)
 
 
 @part
