@@ -169,7 +169,7 @@ def test_photons_take_over_where_all_of_a_band_goes_on(lamp: str) -> None:
     rig, emission = over_an_edge(lamp)
     swept, _ = rig.polygons(emission, 1e-4)
     assert not ((swept.centre[:, 0] > -1.0) & (swept.centre[:, 0] < -0.1)).any()
-    [(leaves, _, _)] = search(rig.beams, [(emission, Search(3e-4, 1, 64, 0.005, faint=2e-5))], 2)
+    [(leaves, _)] = search(rig.beams, [(emission, Search(3e-4, 1, 64, 0.005, faint=2e-5))], 2)
     pieces = pieces_of(leaves, rig.beams, 0, 1.0)
     lattice = PieceLattice(pieces, [cumulative(rig.axis, rig.scene.lights[0].spectral_power)], [1.0])
     (rays,) = lattice.portions(0, 20_000, (1 << 30, 3 << 29), 12345)
