@@ -26,7 +26,7 @@ LIGHT_PARTS = 16, 32, 64
 """Points that represent an extended light, of which one is chosen (`parts_for`); penumbrae blur each into the next."""
 
 SURVEY_PARTS, MOVING_PARTS = 4, 1
-"""Points that represent it in a survey, and in motion."""
+"""Points that represent an extended light in a survey, and in motion."""
 
 
 @dataclass

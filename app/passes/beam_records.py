@@ -155,8 +155,8 @@ def hull_areas(hulls: np.ndarray, first: np.ndarray) -> np.ndarray:
 def levels(polygons: BeamPolygons, chosen: np.ndarray, to_texels: TexelMap) -> np.ndarray:
     """int64 (n,): how many times the texels may double for each of the `chosen`, since its penumbrae are broad.
 
-    A polygon far narrower than its penumbrae shows their mean only, and where a mask cuts it how much of them it
-    keeps; of another the sharpest edge counts."""
+    A polygon far narrower than its penumbrae shows their mean only, and a mask that cuts it is drawn `MASKED` times
+    sharper than that at least; of another the sharpest edge counts."""
     rows, counts = ragged(polygons.edge_start, chosen)
     first = np.cumsum(counts) - counts
     density = to_texels.density(polygons.centre[chosen])

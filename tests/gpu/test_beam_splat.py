@@ -180,7 +180,7 @@ def test_penumbrae_keep_the_energy_and_have_their_width(rig: BeamRig, softness: 
 @pytest.mark.parametrize(("size", "stretch"), [(1e-4, 1e2), (1e-3, 1e3), (1e-2, 10.0)])
 def test_slivers_in_wide_penumbrae_keep_their_energy(gl, size: float, stretch: float) -> None:
     """Up to a millionth of the penumbra wide: windows are what float32 must resolve them in, not texels; slivers
-    of 1 : 1000 were drawn 1.4 times as bright. 1 % would be noticed."""
+    of 1 : 1000 were drawn 1.4 times as bright. 0.5 % would be noticed."""
     rig = BeamRig(gl.ctx, size=(256, 256))
     sliver = polygon(regular(4, (128.3, 127.6), size / np.sqrt(2.0), 0.3, stretch))
     drawn = rig.draw(soft(sliver, 40.0))[..., W].sum()

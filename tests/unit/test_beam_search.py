@@ -310,7 +310,7 @@ material = "diffuse"
 
 def test_water_over_a_receiver_absorbs_the_light_of_a_lamp_with_extent() -> None:
     """Beams get the edges of the facet that they left last besides their own, for penumbrae, and forgot what their last
-    flight had lost: a prism in blue water under a lamp threw four times its light. 1 % would be noticed."""
+    flight had lost: a prism in blue water under a lamp threw four times its light. 0.5 % would be noticed."""
     flux = []
     for grey in (1.0, 0.5):
         text = lamp((0.0, 0.0, 60.0), (0.0, 0.0, -1.0), (0.5, 0.5), "area") + TANK.format(grey=grey)
