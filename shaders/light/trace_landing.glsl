@@ -38,9 +38,11 @@ bool meet_with_band(Path path, out Hit hit, out float border) {
         if (turn > 0u) ray_at(path, x, position, direction);
         Hit seen;
         bool sees = intersect_closest(position, direction, FAR_DISTANCE, path.origin, seen);
-        bool together = sees == met && (!met || seen.object == hit.object);
-        if (turn == 0u || sees && !found) hit = seen;
-        found = found || sees;
+        // A start beyond the edge of the facet left may lie in the plane of a neighbour's, which no light has come to.
+        bool in_plane = turn > 0u && sees && seen.distance < NEAR_DISTANCE;
+        bool together = in_plane || sees == met && (!met || seen.object == hit.object);
+        if (turn == 0u || !(together || found)) hit = seen;
+        found = found || !together;
         if (turn == 0u) {
             met = sees;
             end = ends_part(path, hit, met) ? 3u : 1u;
