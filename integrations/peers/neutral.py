@@ -35,7 +35,9 @@ def described(name: str) -> dict[str, Any]:
     forward = unit(np.subtract(camera["target"], camera["position"]))
     right = unit(np.cross(forward, (0.0, 0.0, 1.0)))
     direction = unit(np.subtract(lamp["target"], lamp["position"]))
-    tangent = unit(np.cross((0.0, 0.0, 1.0), direction))
+    # As SpectraSplat has it; a spot may be turned about its axis.
+    guide = np.array(lamp.get("tangent", np.cross((0.0, 0.0, 1.0), direction)))
+    tangent = unit(guide - (guide @ direction) * direction)
     is_area = lamp["kind"] == "area"
     return {
         "name": name,
