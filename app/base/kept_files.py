@@ -30,6 +30,8 @@ class KeptFiles:
     most_files: int | None = None
     most_bytes: int | None = None
     """Of all of them, packed."""
+    level: int = 1
+    """zlib's, 0 to 9: 0 for what is large and hardly gets smaller."""
 
     def load(self, key: str) -> bytes | None:
         """What was saved under `key`, whole; else None."""
@@ -53,7 +55,7 @@ class KeptFiles:
         with suppress(OSError, UserError):
             path = self._path(key)
             with atomic_output(path, lasting=False) as temporary:
-                temporary.write_bytes(zlib.compress(hashlib.sha256(content).digest() + content, 1))
+                temporary.write_bytes(zlib.compress(hashlib.sha256(content).digest() + content, self.level))
             paths.forget_oldest(path.parent, _SUFFIX, files=self.most_files, size=self.most_bytes)
 
     def _path(self, key: str) -> Path:

@@ -38,8 +38,9 @@ def test_what_is_damaged_or_too_large_is_not_there(kept: KeptFiles, tmp_path: Pa
     assert kept.load("large") is None and len(list((tmp_path / "some").iterdir())) == 1
 
 
-def test_what_was_not_used_for_longest_is_forgotten(kept: KeptFiles, tmp_path: Path) -> None:
-    small = replace(kept, most_bytes=2500)
+@pytest.mark.parametrize("limit", [{"most_bytes": 2500}, {"most_files": 2}])
+def test_what_was_not_used_for_longest_is_forgotten(kept: KeptFiles, tmp_path: Path, limit: dict[str, int]) -> None:
+    small = replace(kept, **limit)
     for at in range(5):
         small.save(str(at), CONTENT)
         (file,) = (tmp_path / "some").glob(f"{at}.*")

@@ -12,16 +12,12 @@ and maximum of float32 corners: multiply the far slab distance by 1 + 2·gamma(3
 from __future__ import annotations
 
 import hashlib
-import os
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from ...base import files, paths
-from ...base.atomic import atomic_output
 from ...base.errors import UserError
+from ...base.kept_files import KeptFiles
 
 MAX_DEPTH = 24
 """No leaf lies deeper than this many edges below the root."""
@@ -40,10 +36,8 @@ NODE = np.dtype(
 """32 bytes, std430-compatible. count > 0: a leaf with the triangles [first, first + count) of the
 reordered list; count = 0: an inner node with children at left and left + 1."""
 
-_CACHE_VERSION = b"spectrasplat bvh 2\n"
-_CACHE_FILES = 32
-_CACHE_BYTES = 256 << 20
-_DIGEST_BYTES = 16
+_LAYOUT = b"spectrasplat bvh 3\n"
+_KEPT = KeptFiles("bvh", 256 << 20, most_files=32, most_bytes=256 << 20, level=0)
 
 
 @dataclass(frozen=True)
@@ -75,14 +69,13 @@ def build_bvh(triangles_xyz: np.ndarray, *, use_cache: bool = True) -> Bvh:
         )
     if not np.isfinite(triangles).all():
         raise ValueError("triangles_xyz has corners that are not finite")
-    cached = _cache_path(triangles) if use_cache else None
-    if cached is not None:
-        tree = _load(cached, len(triangles))
-        if tree is not None:
-            return tree
-    tree = _build(triangles)
-    if cached is not None:
-        _save(cached, tree)
+    if not use_cache:
+        return _build(triangles)
+    key = _key(triangles)
+    tree = _load(key, len(triangles))
+    if tree is None:
+        tree = _build(triangles)
+        _save(key, tree)
     return tree
 
 
@@ -104,44 +97,21 @@ def _build(triangles: np.ndarray) -> Bvh:
     return Bvh(nodes, order, int(depth))
 
 
-def _cache_path(triangles: np.ndarray) -> Path | None:
-    """Where the tree of these triangles is kept, or None where there is no cache folder."""
-    try:
-        folder = paths.cache_dir() / "bvh"
-        folder.mkdir(exist_ok=True)
-    except OSError:
-        return None
-    key = hashlib.blake2b(_CACHE_VERSION + bytes((MAX_DEPTH, MAX_LEAF)), digest_size=_DIGEST_BYTES)
+def _key(triangles: np.ndarray) -> str:
+    """What the tree of these triangles is kept under."""
+    key = hashlib.blake2b(_LAYOUT + bytes((MAX_DEPTH, MAX_LEAF)), digest_size=16)
     key.update(triangles.data)
-    return folder / f"{key.hexdigest()}.bvh"
+    return key.hexdigest()
 
 
-def _load(path: Path, triangle_count: int) -> Bvh | None:
-    """The tree at `path`; None when it is missing, damaged or another version's."""
-    try:
-        data = files.read_bytes(path, _CACHE_BYTES + 4096)
-    except OSError:
+def _load(key: str, triangle_count: int) -> Bvh | None:
+    """The tree kept under `key`, if any."""
+    data = _KEPT.load(key)
+    if data is None:
         return None
-    start = len(_CACHE_VERSION) + _DIGEST_BYTES
-    payload = memoryview(data)[start:]
-    if data[:start] != _CACHE_VERSION + _digest(payload) or len(payload) < 4 + 4 * triangle_count:
-        return None
-    depth = int(np.frombuffer(payload[:4], "<u4")[0])
-    order = np.frombuffer(payload[4 : 4 + 4 * triangle_count], "<i4")
-    with suppress(OSError):
-        os.utime(path)  # the cache forgets the least recently used
-    return Bvh(np.frombuffer(payload[4 + 4 * triangle_count :], NODE), order, depth)
+    depth, order = np.frombuffer(data, "<u4", 1), np.frombuffer(data, "<i4", triangle_count, 4)
+    return Bvh(np.frombuffer(data, NODE, offset=4 + order.nbytes), order, int(depth[0]))
 
 
-def _save(path: Path, tree: Bvh) -> None:
-    payload = np.uint32(tree.depth).astype("<u4").tobytes() + tree.order.astype("<i4").tobytes() + tree.nodes.tobytes()
-    if len(payload) > _CACHE_BYTES:
-        return
-    with suppress(OSError, UserError):  # an unwritable or full cache only costs time
-        with atomic_output(path, lasting=False) as temporary:
-            temporary.write_bytes(_CACHE_VERSION + _digest(payload) + payload)
-        paths.forget_oldest(path.parent, ".bvh", files=_CACHE_FILES, size=_CACHE_BYTES)
-
-
-def _digest(payload: bytes | memoryview) -> bytes:
-    return hashlib.blake2b(payload, digest_size=_DIGEST_BYTES).digest()
+def _save(key: str, tree: Bvh) -> None:
+    _KEPT.save(key, tree.depth.to_bytes(4, "little") + tree.order.astype("<i4").tobytes() + tree.nodes.tobytes())
