@@ -47,9 +47,10 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("MALLOC_MMAP_THRESHOLD_", str(32 << 20))
 os.environ.setdefault("MALLOC_TRIM_THRESHOLD_", str(256 << 20))
 
-# What the driver compiled is kept for the next run. Mesa's folder is named for tests that set a cache folder of their
-# own.
+# What driver and numba compiled is kept for the next run. Their folders are named for tests that set a cache folder of
+# their own.
 os.environ.setdefault("MESA_SHADER_CACHE_DIR", platformdirs.user_cache_dir())
+os.environ.setdefault("NUMBA_CACHE_DIR", platformdirs.user_cache_dir("spectrasplat", appauthor=False))
 
 
 # Hundreds of thousands of objects of modules and tests live to the end: looking through them again and again for what

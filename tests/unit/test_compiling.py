@@ -22,24 +22,40 @@ doubled = compiled(doubled, sys.argv[1], nogil=True)
 assert doubled(21) == 42
 print(sum(doubled.stats.cache_hits.values()))
 """
-NO_FOLDER = "from numba.core import caching\ncaching.CacheImpl._locator_classes = []\n"
 
 
-def hits(folder: Path, version: str = "", before: str = "") -> int:
-    """Functions that a new process takes from the disk; `before`: what it does first."""
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The user's folder for what is compiled."""
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def hits(folder: Path, version: str = "", more: str = "") -> int:
+    """Functions that a new process takes from the disk; `more`: what the source ends with."""
     program = folder / "program.py"
-    if not program.exists():  # numba looks at its time
-        program.write_text(before + PROGRAM)
+    folder.mkdir(exist_ok=True)
+    program.write_text(PROGRAM + more)
     run = [sys.executable, str(program), version]
     return int(subprocess.run(run, check=True, capture_output=True, text=True, cwd=folder).stdout)
 
 
+@pytest.mark.usefixtures("cache")
 def test_the_next_run_takes_it_from_the_disk_until_its_version_changes(tmp_path: Path) -> None:
     assert [hits(tmp_path, version) for version in ("one", "one", "two", "two")] == [0, 1, 0, 1]
 
 
-def test_it_is_compiled_anew_where_no_cache_folder_can_be_written(tmp_path: Path) -> None:
-    assert [hits(tmp_path, before=NO_FOLDER) for _ in range(2)] == [0, 0]
+@pytest.mark.usefixtures("cache")
+def test_clones_of_one_source_share_it(tmp_path: Path) -> None:
+    changed = "# another\n"
+    runs = (("here", ""), ("there", ""), ("there", changed), ("here", ""), ("here", changed))
+    assert [hits(tmp_path / clone, more=text) for clone, text in runs] == [0, 1, 0, 1, 1]
+
+
+def test_it_is_compiled_anew_where_no_cache_folder_can_be_written(tmp_path: Path, cache: Path) -> None:
+    for folder in (cache, tmp_path / "__pycache__"):
+        folder.write_text("a file")
+    assert [hits(tmp_path) for _ in range(2)] == [0, 0]
 
 
 def test_a_version_is_that_of_all_files() -> None:
