@@ -18,6 +18,7 @@ import cmath
 import math
 
 from .compiling import compiled, inlined
+from .polarised import turn_fields
 from .vectors import across, cross, dot, length, moved, over, scaled
 
 WAVE, SYSTEM, WAVES = 2, 3, 7
@@ -201,16 +202,5 @@ def through_sheet(field, d, axis, along, across_it, retardance):
     along its axis and across it, which is `retardance` of a period late."""
     a = moved(axis, -dot(axis, d), d)
     a = over(a, length(a)) if length(a) > _ALONG else across(d)
-    b = cross(d, a)
     late = across_it * cmath.exp(complex(0.0, 2.0 * math.pi * retardance))
-    power = 0.0
-    for i in range(2):
-        e_a, e_b = along * dot(field[i], a), late * dot(field[i], b)
-        power += e_a.real**2 + e_a.imag**2 + e_b.real**2 + e_b.imag**2
-        for k in range(3):
-            field[i, k] = e_a * a[k] + e_b * b[k]
-    per_root = 1.0 / math.sqrt(power) if power > 0.0 else 0.0
-    for i in range(2):
-        for k in range(3):
-            field[i, k] *= per_root
-    return power
+    return turn_fields(field, d, d, a, complex(along), late)

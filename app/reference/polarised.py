@@ -60,7 +60,8 @@ def share_of(field, d, s, a_s, a_p):
 
 @compiled
 def turn_fields(field, d, r, s, a_s, a_p):
-    """Take fields from direction d to direction r (unit vectors) with amplitudes for s and p, and make them 1 again."""
+    """Take fields from direction d to direction r (unit vectors) with amplitudes for s and p, and make them 1 again.
+    Returns the share of the power that the amplitudes leave."""
     p = cross(d, s)
     # Where an interpolated normal gave way to the facet's, s is not perpendicular to the new direction yet.
     t = moved(s, -dot(s, r), r)
@@ -76,3 +77,4 @@ def turn_fields(field, d, r, s, a_s, a_p):
     for i in range(2):
         for k in range(3):
             field[i, k] *= per_root
+    return power
