@@ -230,46 +230,36 @@ def test_functions_against_float64(gl: Context, reflects: bool) -> None:
     assert error[clear].max() < 3e-5
 
 
-def immersed(nm: float, grating: Grating, order: int, block: Mesh, tilt: np.ndarray, wall: Mesh):
-    """The slow tracer's scene of a grating inside a dispersive block, with columns by n and by λ (µm)."""
-    glass = catalogue.find("N-SF11")
-    corners = [mesh.corners() for mesh in (block, screen(np.zeros(3), tilt, 0.5), wall)]
-    material = np.repeat([0, -2, -1], [len(c) for c in corners])
-    per_um = order * grating.lines_per_mm * 1e-3
-    bodies = [
-        tracer.Body(tracer.Index(float(glass.index(nm)), np.array([1.0, 0.0]))),
-        tracer.Body(
-            kind="grating",
-            lines=np.array(grating.direction),
-            step=tracer.Index(per_um * nm * 1e-3, np.array([0.0, per_um])),
-        ),
-        tracer.Body(kind="receiver"),
-    ]
-    return tracer.TriangleList(np.concatenate(corners), material), bodies
-
-
 def test_inside_dispersive_glass_against_the_slow_tracer(gl: Context) -> None:
     """Both columns, by the glass's index and by the wavelength, through a slanted grating immersed in N-SF11."""
-    nm, tilt = 560.0, unit(np.array([0.2, -0.3, 1.0]))
+    nm, tilt, glass = 560.0, unit(np.array([0.2, -0.3, 1.0])), catalogue.find("N-SF11")
     grating = Grating(900.0, (-1, 0, 1), (0.3, 0.3, 0.3), False, (0.3, 1.0, 0.1))
     block, wall = box((2.0, 2.0, 1.4)), screen(np.array([0.0, 0.0, -2.0]), np.array([0.0, 0.0, 1.0]), 6.0)
     direction = unit(np.array([0.15, 0.1, -1.0]))
-    objects = [sheet(grating, normal=tuple(tilt)), placed("block", block, Dielectric(catalogue.find("N-SF11")))]
+    objects = [sheet(grating, normal=tuple(tilt)), placed("block", block, Dielectric(glass))]
     found = trace_beam(gl, objects, None, wall, -1.2 * direction, direction, 0.02, nm, count=32).of_depth(3)
     assert found.dposition_dvar.shape[1] == 2
+    corners = [mesh.corners() for mesh in (block, screen(np.zeros(3), tilt, 0.5), wall)]
+    scene = tracer.TriangleList(np.concatenate(corners), np.repeat([0, -2, -1], [len(c) for c in corners]))
+    lines = np.array(grating.direction)
+
+    def path(start: np.ndarray, order: int, more_um: float = 0.0, more_n: float = 0.0) -> tracer.Path:
+        step = order * grating.lines_per_mm * 1e-3 * (nm * 1e-3 + more_um)
+        bodies = [tracer.Body(float(glass.index(nm)) + more_n), tracer.Body(kind="grating", lines=lines, step=step)]
+        return tracer.follow(tracer.make_ray(start, direction), scene, [*bodies, tracer.Body(kind="receiver")])
+
     matched = 0
     for order in grating.orders:
-        scene, bodies = immersed(nm, grating, order, block, tilt, wall)
-        for k in range(len(found.records)):
-            ray = tracer.make_ray(found.start[k], direction, np.zeros((2, 3)))
-            path = tracer.follow(ray, scene, bodies)
-            if not path.landed or np.linalg.norm(path.ray.position - found.position[k]) > 1e-3:
+        for k, start in enumerate(found.start):
+            exact = path(start, order)
+            if not exact.landed or np.linalg.norm(exact.ray.position - found.position[k]) > 1e-3:
                 continue
             matched += 1
-            assert np.linalg.norm(path.ray.position - found.position[k]) < 1e-5
+            assert np.linalg.norm(exact.ray.position - found.position[k]) < 1e-5
             # Groups are in the order of the objects: the grating's wavelength first.
-            got = found.dposition_dvar[k][::-1]
-            assert np.abs(got - path.ray.dposition).max() < 3e-5 * max(np.abs(path.ray.dposition).max(), 1.0)
+            for column, more in enumerate(("more_um", "more_n")):
+                want = tracer.central_difference(lambda x, m=more, at=(start, order): path(*at, **{m: x}), 1e-4)
+                assert np.abs(found.dposition_dvar[k, column] - want).max() < 3e-5 * max(np.abs(want).max(), 1.0)
     assert matched > 60
 
 

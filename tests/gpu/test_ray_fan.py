@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from reference import tracer
-from reference.tracer import Body, Index, TriangleList
+from reference.tracer import Body, TriangleList
 from spectrasplat.features.features import Features
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.geometry import primitives_round
@@ -63,7 +63,7 @@ def reference_of(
         kind = {Mirror: -2, Dielectric: len(bodies)}.get(type(item.material), -1)
         material.append(np.full(len(corners[-1]), kind))
         if isinstance(item.material, Dielectric):
-            bodies.append(Body(Index(float(item.material.dispersion.index(nm))), priority=item.material.priority))
+            bodies.append(Body(float(item.material.dispersion.index(nm)), priority=item.material.priority))
     world = TriangleList(np.concatenate(corners), np.concatenate(material), np.concatenate(normals))
     ends = [Body(kind="mirror"), Body(kind="receiver")]
     return tracer.follow(tracer.make_ray(origin, direction), world, [*bodies, *ends], max_depth=23), world

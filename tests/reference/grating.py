@@ -21,24 +21,3 @@ def diffract(
         c = np.sqrt(np.where(c2 > 0.0, c2, np.nan))
     forward = np.sign(dot(direction, normal_out)) * (-1.0 if reflects else 1.0)
     return times(a, across) + times(b, along) + times(forward * c, normal_out)
-
-
-def diffract_columns(
-    direction: np.ndarray,
-    ddirection: np.ndarray,
-    normal_out: np.ndarray,
-    lines: np.ndarray,
-    step: float,
-    dstep: np.ndarray,
-    reflects: bool,
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """(direction (3,), columns (C, 3)) of an order of a flat grating; None where it is evanescent.
-
-    The part in the surface hands its change on; the normal part keeps the length 1.
-    """
-    turned = diffract(direction[None], normal_out, lines, np.array([step]), reflects)[0]
-    if not np.isfinite(turned).all():
-        return None
-    across = unit(cross(lines, normal_out))
-    moved = ddirection - (ddirection @ normal_out)[:, None] * normal_out + np.outer(dstep, across)
-    return turned, moved - np.outer((moved @ turned) / (turned @ normal_out), normal_out)

@@ -13,7 +13,6 @@ import numpy as np
 from reference.tracer import (
     RECEIVER,
     Body,
-    Index,
     Path,
     TriangleList,
     central_difference,
@@ -74,7 +73,7 @@ class ReferenceScene:
             match item.material:
                 case Dielectric(dispersion, absorption, priority):
                     per_unit = 0.0 if absorption is None else float(np.interp(nm, VISIBLE_NM, absorption.coefficient))
-                    found.append(Body(Index(index_of(dispersion)), per_unit, priority=priority))
+                    found.append(Body(index_of(dispersion), per_unit, priority=priority))
                 case Mirror(rgb):
                     found.append(Body(reflectance=float(mirror_reflectance(rgb, np.array(nm))), kind="mirror"))
         return [*found, Body(kind="receiver")]
@@ -113,7 +112,7 @@ class ReferenceScene:
             )
             for g in range(photons.groups.count)
         ]
-        return np.array([central_difference(path_of, STEP)[0] for path_of in (*sides, *spectral)])
+        return np.array([central_difference(path_of, STEP) for path_of in (*sides, *spectral)])
 
 
 def choices_of(photons: Photons, longest: int) -> list[tuple[int, ...]]:

@@ -1,8 +1,7 @@
 """Smooth and faceted surfaces for the reference tracer: where a ray meets them and how they bend there.
 
-Each surface answers `distances(origin, direction)` — signed, ascending — and
-`normals(point, dposition)` — the geometric normal, the shading normal and the shading normal's
-derivative for columns (C, 3). Normals point outward, or to the side a plane's normal names.
+Each surface answers `distances(origin, direction)` — signed, ascending — and `normals(point)` — the geometric normal
+and the shading normal. Normals point outward, or to the side a plane's normal names.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ class Surface(Protocol):
 
     def distances(self, origin: np.ndarray, direction: np.ndarray) -> np.ndarray: ...
 
-    def normals(self, point: np.ndarray, dposition: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
+    def normals(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]: ...
 
 
 @dataclass(frozen=True)
@@ -33,9 +32,9 @@ class Plane:
         normal = unit(np.array(self.normal, float))
         return np.array([(np.array(self.point) - origin) @ normal / (direction @ normal)])
 
-    def normals(self, point: np.ndarray, dposition: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def normals(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         normal = unit(np.array(self.normal, float))
-        return normal, normal, np.zeros_like(dposition)
+        return normal, normal
 
 
 @dataclass(frozen=True)
@@ -57,11 +56,9 @@ class Quadric:
         half = np.sqrt(discriminant / a)
         return np.array([-b / a - half, -b / a + half])
 
-    def normals(self, point: np.ndarray, dposition: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        weights = 1.0 / np.array(self.semi_axes) ** 2
-        gradient = (point - np.array(self.centre)) * weights
-        normal = unit(gradient)
-        return normal, normal, normalised_derivative(gradient, dposition * weights)
+    def normals(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        normal = unit((point - np.array(self.centre)) / np.array(self.semi_axes) ** 2)
+        return normal, normal
 
 
 def sphere(centre: tuple[float, float, float], radius: float) -> Quadric:
@@ -80,11 +77,11 @@ class Facet:
         normal = self.area_vector()
         return np.array([(self.corners[0] - origin) @ normal / (direction @ normal)])
 
-    def normals(self, point: np.ndarray, dposition: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def normals(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         geometric = unit(self.area_vector())
         if self.corner_normals is None:
-            return geometric, geometric, np.zeros_like(dposition)
-        return geometric, *shading_normal_column(self.corners, self.corner_normals, point, dposition)
+            return geometric, geometric
+        return geometric, unit(barycentric_weights(self.corners, point) @ self.corner_normals)
 
     def area_vector(self) -> np.ndarray:
         a, b, c = self.corners

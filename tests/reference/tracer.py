@@ -1,119 +1,80 @@
-"""A slow, readable float64 ray with its derivative columns, and the central differences that judge them.
-
-A `Ray` carries C columns: column c is the derivative of (position, direction) with respect to
-a variable of its own — a coordinate of the emission domain, a refractive index, a wavelength.
-What a column means is said by its seed and by the derivatives of the indices along it.
-"""
+"""A slow, readable float64 ray, and the central differences of its paths that derivatives are judged by."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from reference.grating import diffract_columns
+from reference.grating import diffract
 from reference.surfaces import Facet, Surface
-from reference.textbook_optics import fresnel_reflectance, refract_column_textbook
+from reference.textbook_optics import fresnel_reflectance
 from spectrasplat.reference import optics, polarised
-
-
-def _no_columns() -> np.ndarray:
-    return np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
 class Ray:
-    """A ray and its columns."""
+    """A ray."""
 
     position: np.ndarray
     direction: np.ndarray
     """Unit, propagation."""
-    dposition: np.ndarray = field(default_factory=_no_columns)
-    """(C, 3)."""
-    ddirection: np.ndarray = field(default_factory=_no_columns)
-    """(C, 3)."""
 
     def at(self, distance: float) -> np.ndarray:
         return self.position + distance * self.direction
 
 
-def make_ray(
-    position: Sequence[float], direction: Sequence[float], dposition: Sequence = (), ddirection: Sequence | None = None
-) -> Ray:
-    """A ray from plain sequences; the direction is normalised, missing direction columns are zero."""
-    dposition = np.array(dposition, np.float64).reshape(-1, 3)
-    ddirection = np.zeros_like(dposition) if ddirection is None else np.array(ddirection, np.float64).reshape(-1, 3)
-    return Ray(np.array(position, np.float64), optics.unit(np.array(direction, np.float64)), dposition, ddirection)
+def make_ray(position: Sequence[float], direction: Sequence[float]) -> Ray:
+    """A ray from plain sequences; the direction is normalised."""
+    return Ray(np.array(position, np.float64), optics.unit(np.array(direction, np.float64)))
 
 
-@dataclass(frozen=True)
-class Index:
-    """A refractive index and its derivative (C,) along each column (a scalar 0 where none depends on it)."""
-
-    n: float
-    dn: np.ndarray | float = 0.0
+AIR = 1.0
 
 
-AIR = Index(1.0)
+def advance(ray: Ray, surface: Surface, distance: float) -> tuple[Ray, np.ndarray, np.ndarray]:
+    """Move a ray to a surface: (ray there, outward geometric normal, shading normal turned against the ray)."""
+    arrived = replace(ray, position=ray.at(distance))
+    geometric, normal = surface.normals(arrived.position)
+    return arrived, geometric, -normal if ray.direction @ normal > 0.0 else normal
 
 
-def advance(ray: Ray, surface: Surface, distance: float) -> tuple[Ray, np.ndarray, np.ndarray, np.ndarray]:
-    """Move a ray to a surface: (ray there, outward geometric normal, n̂ and ∂n̂ turned against the ray)."""
-    point = ray.at(distance)
-    geometric, _, _ = surface.normals(point, ray.dposition)
-    dposition = optics.transfer_column(ray.dposition, ray.ddirection, ray.direction, geometric, np.float64(distance))
-    _, normal, dnormal = surface.normals(point, dposition)
-    if ray.direction @ normal > 0.0:
-        normal, dnormal = -normal, -dnormal
-    return replace(ray, position=point, dposition=dposition), geometric, normal, dnormal
-
-
-def reflected(ray: Ray, normal: np.ndarray, dnormal: np.ndarray) -> Ray:
+def reflected(ray: Ray, normal: np.ndarray) -> Ray:
     """The ray after a mirror at its position."""
-    return replace(
-        ray,
-        direction=optics.reflect(ray.direction, normal),
-        ddirection=optics.reflect_column(ray.direction, ray.ddirection, normal, dnormal),
-    )
+    return replace(ray, direction=optics.reflect(ray.direction, normal))
 
 
-def refracted(ray: Ray, normal: np.ndarray, dnormal: np.ndarray, n_i: Index, n_t: Index) -> Ray | None:
-    """The ray beyond a boundary, or None at total reflection; textbook columns."""
-    eta = n_i.n / n_t.n
+def refracted(ray: Ray, normal: np.ndarray, n_i: float, n_t: float) -> Ray | None:
+    """The ray beyond a boundary, or None at total reflection."""
+    eta = n_i / n_t
     if optics.transmitted_cosine2(ray.direction, normal, eta) <= 0.0:
         return None
-    # d(n_i/n_t) by the quotient rule.
-    deta = np.broadcast_to((np.asarray(n_i.dn) * n_t.n - n_i.n * np.asarray(n_t.dn)) / n_t.n**2, len(ray.dposition))
-    return replace(
-        ray,
-        direction=optics.refract(ray.direction, normal, eta),
-        ddirection=refract_column_textbook(ray.direction, ray.ddirection, normal, dnormal, eta, deta),
-    )
+    return replace(ray, direction=optics.refract(ray.direction, normal, eta))
 
 
-def through(ray: Ray, surface: Surface, n_i: Index, n_t: Index, root: int = 0, mirror: bool = False) -> Ray:
+def through(ray: Ray, surface: Surface, n_i: float, n_t: float, root: int = 0, mirror: bool = False) -> Ray:
     """Follow a ray to the given root of a surface and refract it there (reflect it, where `mirror`).
 
     Raises ValueError at total internal reflection.
     """
-    arrived, _, normal, dnormal = advance(ray, surface, surface.distances(ray.position, ray.direction)[root])
-    left = reflected(arrived, normal, dnormal) if mirror else refracted(arrived, normal, dnormal, n_i, n_t)
+    arrived, _, normal = advance(ray, surface, surface.distances(ray.position, ray.direction)[root])
+    left = reflected(arrived, normal) if mirror else refracted(arrived, normal, n_i, n_t)
     if left is None:
         raise ValueError("total internal reflection")
     return left
 
 
 def onto(ray: Ray, surface: Surface, root: int = 0) -> Ray:
-    """Move a ray and its columns to a surface without changing its direction."""
+    """Move a ray to a surface without changing its direction."""
     return advance(ray, surface, surface.distances(ray.position, ray.direction)[root])[0]
 
 
 # ---- triangle lists --------------------------------------------------------------------------
 
-RECEIVER, MIRROR = -1, -2
-"""Materials of a triangle that are not glass; a glass is its position in the list of indices."""
+RECEIVER = -1
+"""Material of a triangle; a glass is its position in the list of bodies."""
 
 TOUCHING = 1e-9
 """Two surfaces closer than this are at one place: a ray enters what lies there before it leaves."""
@@ -123,7 +84,7 @@ TOUCHING = 1e-9
 class Body:
     """What a ray meets, at one wavelength."""
 
-    index: Index = AIR
+    index: float = AIR
     absorption: float = 0.0
     """Per unit of length, inside."""
     reflectance: float = 1.0
@@ -133,8 +94,8 @@ class Body:
     kind: Literal["glass", "mirror", "receiver", "grating"] = "glass"
     lines: np.ndarray | None = None
     """(3,): along a grating's lines. `reflectance` is the efficiency of its one order."""
-    step: Index = Index(0.0)
-    """m λ / Λ of that order, and its derivative along each column."""
+    step: float = 0.0
+    """m λ / Λ of that order."""
     throws_back: bool = False
 
 
@@ -200,7 +161,7 @@ class Path:
     """Where a ray went. `triangles[-1]` is the receiver's, unless the ray escaped or ran too deep."""
 
     ray: Ray
-    """At the last hit, with its columns (at the last departure, where it escaped)."""
+    """At the last hit (at the last departure, where it escaped)."""
     triangles: tuple[int, ...]
     reflections: tuple[bool, ...]
     """For each specular event: whether it was reflected."""
@@ -249,14 +210,14 @@ def follow(
         triangle, distance = hit
         factor *= float(np.exp(-_medium(inside, bodies).absorption * distance))
         triangles.append(triangle)
-        arrived, geometric, normal, dnormal = advance(ray, scene.facet(triangle), distance)
+        arrived, geometric, normal = advance(ray, scene.facet(triangle), distance)
         margin = min(margin, abs(float(ray.direction @ geometric)))
         material = int(scene.material[triangle])
         body = bodies[material]
         if body.kind == "receiver":
             return Path(arrived, tuple(triangles), tuple(reflections), True, factor, margin)
         if body.kind == "mirror":
-            ray = reflected(arrived, normal, dnormal)
+            ray = reflected(arrived, normal)
             _turned(field, arrived, ray, normal, -1.0, 1.0)
             factor *= body.reflectance
             reflections.append(True)
@@ -276,11 +237,11 @@ def follow(
             # Another glass decides here: the boundary is not seen.
             ray, inside = arrived, after
             continue
-        eta_it = n_i.index.n / n_t.index.n
+        eta_it = n_i.index / n_t.index
         reflectance = float(fresnel_reflectance(arrived.direction, normal, eta_it))
         margin = min(margin, float(np.sqrt(abs(optics.transmitted_cosine2(arrived.direction, normal, eta_it)))))
-        beyond = None if reflects(len(reflections)) else refracted(arrived, normal, dnormal, n_i.index, n_t.index)
-        sent = reflected(arrived, normal, dnormal) if beyond is None else beyond
+        beyond = None if reflects(len(reflections)) else refracted(arrived, normal, n_i.index, n_t.index)
+        sent = reflected(arrived, normal) if beyond is None else beyond
         if polarisation:
             r_s, r_p, t_s, t_p = polarised.amplitudes(-float(arrived.direction @ normal), eta_it)
             factor *= _turned(field, arrived, sent, normal, *((r_s, r_p) if beyond is None else (t_s, t_p)))
@@ -299,14 +260,12 @@ def _turned(field: np.ndarray, before: Ray, after: Ray, normal: np.ndarray, a_s:
     return float(share)
 
 
-def _diffracted(ray: Ray, normal_out: np.ndarray, body: Body, index: Index) -> Ray | None:
+def _diffracted(ray: Ray, normal_out: np.ndarray, body: Body, index: float) -> Ray | None:
     """The ray behind a flat grating in a medium of this index; None where its order is evanescent."""
     assert body.lines is not None
-    dstep = (np.asarray(body.step.dn) * index.n - body.step.n * np.asarray(index.dn)) / index.n**2
-    columns = np.broadcast_to(dstep, len(ray.dposition))
-    step = body.step.n / index.n
-    sent = diffract_columns(ray.direction, ray.ddirection, normal_out, body.lines, step, columns, body.throws_back)
-    return None if sent is None else replace(ray, direction=sent[0], ddirection=sent[1])
+    step = np.array([body.step / index])
+    (direction,) = diffract(ray.direction[None], normal_out, body.lines, step, body.throws_back)
+    return replace(ray, direction=direction) if np.isfinite(direction).all() else None
 
 
 _OUTSIDE = Body()
@@ -317,35 +276,17 @@ def _medium(inside: frozenset[int], bodies: Sequence[Body]) -> Body:
     return bodies[max(inside, key=lambda i: (bodies[i].priority, i))] if inside else _OUTSIDE
 
 
-def trace(
-    ray: Ray,
-    scene: TriangleList,
-    indices: Sequence[Index],
-    reflect_at: Sequence[int] = (),
-    max_depth: int = 64,
-    along: Sequence[int] | None = None,
-) -> Path:
-    """`follow` through clear glasses of `indices`, perfect mirrors (`MIRROR`) and receivers (`RECEIVER`)."""
-    bodies = [*map(Body, indices), Body(kind="mirror"), Body(kind="receiver")]
-    return follow(ray, scene, bodies, lambda event: event in reflect_at, max_depth, along)
-
-
 def _distance(ray: Ray, facet: Facet) -> float:
     return float(facet.distances(ray.position, ray.direction)[0])
 
 
-def central_difference(path_of: Callable[[float], Path], step: float) -> tuple[np.ndarray, np.ndarray]:
-    """(∂position, ∂direction) at the end of `path_of(x)` at x = 0, to fourth order in the step.
+def central_difference(path_of: Callable[[float], Path], step: float) -> np.ndarray:
+    """∂position at the end of `path_of(x)` at x = 0, to fourth order in the step.
 
     Raises ValueError when the four neighbours do not run over the same triangles and choices.
     """
     paths = {k: path_of(k * step) for k in (-2, -1, 1, 2)}
     if len({(p.triangles, p.reflections) for p in paths.values()}) != 1:
         raise ValueError("the neighbouring paths differ; use a smaller step or force one sequence")
-
-    def slope(of: Callable[[Path], np.ndarray]) -> np.ndarray:
-        near = of(paths[1]) - of(paths[-1])
-        far = of(paths[2]) - of(paths[-2])
-        return (8.0 * near - far) / (12.0 * step)
-
-    return slope(lambda p: p.ray.position), slope(lambda p: p.ray.direction)
+    far, near, ahead, farther = (p.ray.position for p in paths.values())
+    return (8.0 * (ahead - near) - (farther - far)) / (12.0 * step)

@@ -24,7 +24,7 @@ from reference.known_answers import (
     rainbow_height,
 )
 from reference.surfaces import Plane, sphere
-from reference.tracer import AIR, Index, Ray, make_ray, through
+from reference.tracer import AIR, Ray, make_ray, through
 from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
@@ -141,13 +141,14 @@ def achromat() -> tuple[Arrangement, tuple[float, float, float]]:
     flint = lifted(lens(radii[1], np.inf, 0.01, 1.0, 20_000), 0.02)
 
     def exact(nm: float) -> float:
-        ray = make_ray([-1, 0, 0], [1, 0, 0], [[0, 1, 0]])
+        height = 1e-4
+        ray = make_ray([-1, height, 0], [1, 0, 0])
         for name, radius, front, back in (("N-BK7", radii[0], -0.01, 0.01), ("F2", radii[1], 0.015, 0.025)):
-            index = Index(n_of(name, nm))
+            index = n_of(name, nm)
             curved = sphere((front + radius, 0, 0), abs(radius))
             ray = through(ray, curved, AIR, index, root=0 if radius > 0 else 1)
             ray = through(ray, Plane((back, 0, 0), (1, 0, 0)), index, AIR)
-        return float(-1 / ray.ddirection[0, 1])
+        return float(-height / ray.direction[1])
 
     f, d, c = (exact(nm) for nm in LINES)
     return lenses_on_z({"N-BK7": crown, "F2": flint}, 0.45, 50.0, 150.0), (f, d, c)
@@ -187,11 +188,11 @@ def rainbow(reflections: int) -> Arrangement:
 
 def in_ball(height: float, n: float, reflections: int) -> Ray:
     """The exact ray, from x = −2 along +x, after so many reflections inside the ball of radius 1."""
-    ball, index = sphere((0, 0, 0), 1.0), Index(n)
-    ray = through(make_ray([-2, height, 0], [1, 0, 0]), ball, AIR, index)
+    ball = sphere((0, 0, 0), 1.0)
+    ray = through(make_ray([-2, height, 0], [1, 0, 0]), ball, AIR, n)
     for _ in range(reflections):
-        ray = through(ray, ball, index, index, root=1, mirror=True)
-    return through(ray, ball, index, AIR, root=1)
+        ray = through(ray, ball, n, n, root=1, mirror=True)
+    return through(ray, ball, n, AIR, root=1)
 
 
 def amici() -> Arrangement:
