@@ -102,7 +102,7 @@ def test_in_a_furnace_lossless_things_cast_no_shadow(gl: Context, material: Mate
     """White light from everywhere: what glass and mirrors take from one direction they bring from another. The receiver
     is so small that hardly any of it is itself what they show."""
     thing = place(sphere(0.5, 8000), material, (0.0, 0.0, 0.7))
-    _, normal, _, light = asked(gl, scene_of(thing, floor(0.02)), 8192, finer=0.02)
+    _, normal, _, light = asked(gl, scene_of(thing, floor(0.02)), 4096, finer=0.02)
     above = light[normal[:, 2] > 0.5]
     assert abs(above.mean() - 1.0) < 1e-3
 
@@ -114,7 +114,7 @@ def test_tinted_glass_takes_its_share(gl: Context) -> None:
     lit = []
     for material in (clear, tinted):
         slab = place(primitives.box((40.0, 40.0, 0.1)), material, (0.0, 0.0, 0.2))
-        _, normal, _, light = asked(gl, scene_of(slab, floor(0.02)), 8192, finer=0.02)
+        _, normal, _, light = asked(gl, scene_of(slab, floor(0.02)), 4096, finer=0.02)
         lit.append(light[normal[:, 2] > 0.5].mean())
     # Refracted into the critical cone, light goes up to a third farther than straight through.
     assert lit[0] == pytest.approx(1.0, abs=2e-3)

@@ -19,7 +19,8 @@ from tests.interface.panel_rig import PanelRig, scene_state
 
 def test_a_stone_is_judged_in_the_window(gl: Context, monkeypatch: pytest.MonkeyPatch) -> None:
     """Asked for, not there yet, there with four (small) pictures, and old once the stone is of another glass."""
-    monkeypatch.setattr(report, "SIDE", 64)
+    for name, rays in (("SIDE", 64), ("_FACE_COUNT", 48), ("_TILT_COUNT", 24)):
+        monkeypatch.setattr(report, name, rays)
     exports = Exports(gl)
     with PanelRig(gl, draw_gem_panel, scene_state("brilliant")) as rig:
         rig.click("Judge diamond")

@@ -120,7 +120,7 @@ def ellipsoid(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def truth(ellipsoid: Scene) -> np.ndarray:
-    return reference(ellipsoid, 6_000_000)
+    return reference(ellipsoid, 2_000_000)
 
 
 @pytest.fixture(scope="module")

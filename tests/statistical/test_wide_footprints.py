@@ -65,7 +65,7 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 @pytest.fixture(scope="module")
 def truth(scene: Scene) -> np.ndarray:
-    return blocks(cached_reference(scene, WIDTH, HEIGHT, photons=4_000_000).xyz[..., 1])
+    return blocks(cached_reference(scene, WIDTH, HEIGHT, photons=2_000_000).xyz[..., 1])
 
 
 def blocks(picture: np.ndarray) -> np.ndarray:

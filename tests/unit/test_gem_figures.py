@@ -31,6 +31,7 @@ SIDE = 64
 @pytest.fixture(autouse=True)
 def small_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(report, "SIDE", SIDE)
+    monkeypatch.setattr(report, "_FACE_COUNT", 2 * SIDE)
 
 
 def turned_prism(n: float):

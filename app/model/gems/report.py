@@ -31,6 +31,8 @@ SIDE = 512
 _SAMPLES = 2
 """… each of as many rays along either side."""
 TILTS_DEG = np.arange(-30.0, 30.1, 3.0)
+_FACE_COUNT = 256
+"""Rays along a side for the figures."""
 _TILT_COUNT = 72
 """Rays along the side of the square round a tilted stone."""
 _FULL_SPREAD_DEG = 2.0
@@ -120,7 +122,7 @@ def gem_report(
         if report is not None:
             report(begun + share * (ends - begun), text)
 
-    found = figures(stone, head_deg, 256, lambda share, text: told(0.2 * share, text), stopped)
+    found = figures(stone, head_deg, _FACE_COUNT, lambda share, text: told(0.2 * share, text), stopped)
     if found is None:
         return None
     curves = np.full((3, 2, len(TILTS_DEG)), np.nan)
