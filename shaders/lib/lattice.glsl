@@ -16,6 +16,11 @@ vec2 lattice_point(uint i, uint count, uvec2 shift) {
     return vec2(along, kronecker(i, GOLDEN, shift.y));
 }
 
+// A third coordinate of a photon of several lattices: even over each of them, wherever on it, and over all together.
+float drawn_evenly(uint photon_id, uint lattices, uint shift) {
+    return kronecker(photon_id / lattices, 3774877043u, shift + photon_id % lattices * PLASTIC_2);
+}
+
 // Point of `count` in the unit square, each with its mirror image in the square's middle: few points on a lamp then
 // have their mean in its middle, and what they light is blurred, not moved.
 vec2 mirrored_lattice_point(uint i, uint count, uvec2 shift) {

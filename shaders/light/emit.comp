@@ -156,7 +156,7 @@ void main() {
         if (RANDOM_WAVELENGTH) {
             // By brightness within the band; a laser's band has no width, and its photons all have its wavelength.
             float place_in_band = EVEN_WAVELENGTHS
-                ? kronecker(id, 3774877043u, p.shift_spectral)
+                ? drawn_evenly(id, lattices, p.shift_spectral)
                 : unit_float(hash_combine(hash_combine(p.shift_spectral, p.light), id));
             float per_density = 1.0;
             if (band.y > band.x)

@@ -28,14 +28,10 @@ vec3 band_powers(uint row, vec3 band) {
     return vec3(anchor - low - upper, upper + high - anchor - uppermost, uppermost);
 }
 
-// Of the sequence by which levels are rounded, neither of the lattice's own.
-#define TINT_GENERATOR 3774877043u
-
 // How far a ray has come through the glass whose tint has levels: up or down to one of them, the same way all along its
 // path.
 uint tint_level(Path path) {
-    float rounding = kronecker(
-        path.walk.photon_id / p.lattices, TINT_GENERATOR, p.tint_key + path.walk.photon_id % p.lattices * 2654435769u);
+    float rounding = drawn_evenly(path.walk.photon_id, p.lattices, p.tint_key);
     float place = min(float(TINT_LEVELS) * path.walk.tinted.x / (1.0 + path.walk.tinted.x), float(TINT_LEVELS - 1)),
           level = floor(place);
     // What is left falls the less the less of it there is: odds of a half lie before or behind the middle.

@@ -131,13 +131,15 @@ def test_places_on_a_lamp_have_their_mean_in_its_middle_and_are_even(count: int)
 
 @pytest.mark.parametrize("light_points", [1, 3, 16, 256, 4096, 8192])
 def test_one_wavelength_a_photon_is_even_whatever_the_number_of_places(light_points: int) -> None:
-    """`stochastic-even`: with every number of places on a light the wavelengths of a pass are even, alone and with the
-    lattice."""
+    """`stochastic-even`: with every number of places on a light the wavelengths of a pass are even, alone, with the
+    lattice, and of each place in each quarter of its lattice."""
     points = 65_536 // light_points
     photon = np.arange(points * light_points)
-    colour = kronecker(photon, 3774877043, 0)
-    assert star_discrepancy(colour) < 3.0 * np.log(len(photon)) / len(photon)
     point, place = photon // light_points, photon % light_points
+    colour = kronecker(point, 3774877043, place * 2447445414)
+    assert star_discrepancy(colour) < 3.0 * np.log(len(photon)) / len(photon)
+    for part in np.array_split(colour[place == light_points // 2], 4) if points > 64 else []:
+        assert star_discrepancy(part) < 2.0 * np.log(len(part)) / len(part)
     on_light = mirrored_lattice_point(place, light_points, (0, 0))
     for other in (
         ([point / points] if points > 64 else [])
