@@ -123,6 +123,25 @@ def test_obj_corner_forms(tmp_path: Path, form: str, pad: str) -> None:
 
 
 @pytest.mark.parametrize("binary", [True, False])
+@pytest.mark.parametrize("shift", range(8))
+@pytest.mark.parametrize("turn", [1, -1])
+def test_hollow_polygons_are_cut_within_their_outline(tmp_path: Path, binary: bool, shift: int, turn: int) -> None:
+    # A rod with a groove: a fan about a corner of its ends covers up to 1.9 times their area, or none of the groove.
+    outline = np.roll([(0, 0), (3, 0), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3), (0, 3)], shift, axis=0)[::turn]
+    outline = np.column_stack([outline, np.zeros(8)])[:, [1, 2, 0]]
+    vertices = np.vstack([outline, outline + (0, 1, 0)])
+    ends = np.arange(8)
+    sides = [[i, (i + 1) % 8, 8 + (i + 1) % 8, 8 + i] for i in range(8)]
+    rows = [ends[::-1].tolist(), (8 + ends).tolist(), *sides]
+    words = ["v\t{}\t{}\t{}".format(*each) for each in vertices]
+    words += ["f\t" + " ".join(str(1 + number) for number in row) for row in rows]
+    text = _binary_ply("<", rows, vertices) if binary else "\n".join(words)
+    mesh = load_mesh(_write(tmp_path, "rod.ply" if binary else "rod.obj", text))
+    assert mesh.is_closed and abs(mesh.volume()) == pytest.approx(7.0)
+    assert np.linalg.norm(mesh.area_vectors(), axis=1).sum() == pytest.approx(2 * 7.0 + 16.0)
+
+
+@pytest.mark.parametrize("binary", [True, False])
 def test_stl_is_welded(tmp_path: Path, binary: bool) -> None:
     ball = primitives.sphere(1.0, 320)
     facet = "facet normal 0 0 0\nouter loop\n{}endloop\nendfacet\n"

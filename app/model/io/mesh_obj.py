@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...base.errors import UserError
-from .mesh_raw import Groups, RawMesh, fan_corners
+from .mesh_raw import Groups, RawMesh, triangles_of
 
 _POSITION, _TEXTURE, _NORMAL = range(3)
 _LARGEST = 1 << 40
@@ -24,7 +24,7 @@ def read_obj(data: bytes, path: str) -> RawMesh:
     lines = data.decode("utf-8", "replace").replace("\\\r\n", " ").replace("\\\n", " ").split("\n")
     kinds: dict[str, list[tuple[int, str]]] = {word: [] for word in _STATEMENTS}
     for number, line in enumerate(lines, start=1):
-        word, _, rest = line.lstrip().partition(" ")
+        word, _, rest = line.strip().replace("\t", " ").partition(" ")
         if word in kinds:
             kinds[word].append((number, rest.partition("#")[0]))
     tables = [_numbers(kinds[word], width, path) for word, width in _WIDTHS.items()]
@@ -43,7 +43,7 @@ def read_obj(data: bytes, path: str) -> RawMesh:
                 f"{path}: line {kinds['f'][face][0]}: the face names {what} {corners[np.argmax(wrong), column]}, "
                 f"but the file has {len(table)} (numbered from 1); export the mesh again"
             )
-    triangles = fan_corners(sizes)
+    triangles = triangles_of(sizes, tables[_POSITION][corners[:, _POSITION] - 1])
     picked = corners[triangles] - 1
     return RawMesh(
         tables[_POSITION],

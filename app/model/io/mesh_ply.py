@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import UserError
-from .mesh_raw import RawMesh, as_float64, fan_corners
+from .mesh_raw import RawMesh, as_float64, triangles_of
 
 _TYPES = {
     "char": "i1",
@@ -87,9 +87,9 @@ def read_ply(data: bytes, path: str) -> RawMesh:
         raise UserError(f"{path}: the PLY file has no faces; a point cloud cannot be rendered")
     if not (np.abs(indices) < _LARGEST).all():
         raise UserError(f"{path}: a face of the PLY file names no vertex; export the mesh again")
-    triangles = indices.astype(np.int64)[fan_corners(sizes)]
-    vertices = _stack(vertex, ("x", "y", "z"))
-    in_range = bool(((triangles >= 0) & (triangles < len(vertices))).all())
+    vertices, indices = _stack(vertex, ("x", "y", "z")), indices.astype(np.int64)
+    in_range = bool(((indices >= 0) & (indices < len(vertices))).all())
+    triangles = indices[triangles_of(sizes, vertices[indices] if in_range else np.zeros((len(indices), 3)))]
 
     def at_corners(names: tuple[str, ...]) -> np.ndarray | None:
         # With a face out of range nothing can be looked up; make_mesh says so.

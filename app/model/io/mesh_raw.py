@@ -1,4 +1,4 @@
-"""What a mesh reader returns before anything is checked, the fan that cuts polygons, and the reader of STL files."""
+"""What a mesh reader returns before anything is checked, how polygons are cut, and the reader of STL files."""
 
 from __future__ import annotations
 
@@ -42,20 +42,58 @@ def as_float64(values: np.ndarray) -> np.ndarray:
         return values.astype(np.float64)
 
 
-def fan_corners(sizes: np.ndarray) -> np.ndarray:
-    """Corner numbers of the triangles of consecutive polygons with `sizes` corners, int64 (T, 3).
+def triangles_of(sizes: np.ndarray, positions: np.ndarray) -> np.ndarray:
+    """Corner numbers of the triangles of consecutive polygons with `sizes` corners at `positions` (N, 3), int64 (T, 3).
 
-    Polygon k of n corners becomes n - 2 triangles round its first corner; polygons of
-    fewer than three corners vanish.
+    Polygon k of n corners becomes n - 2 triangles: round its first corner, or ears (Meisters 1975) where some of those
+    would lie outside of it; polygons of fewer than three corners vanish.
     """
     sizes = np.asarray(sizes, dtype=np.int64)
     first = np.cumsum(sizes) - sizes
     cuts = np.maximum(sizes - 2, 0)
     root = np.repeat(first, cuts)
     step = np.arange(cuts.sum()) - np.repeat(np.cumsum(cuts) - cuts, cuts)
-    return np.stack([root, root + step + 1, root + step + 2], axis=1)
+    triangles = np.stack([root, root + step + 1, root + step + 2], axis=1)
+    if (cuts > 1).any():
+        polygon = np.repeat(np.arange(len(sizes)), cuts)
+        normal = np.zeros((len(sizes), 3))
+        with np.errstate(over="ignore", invalid="ignore"):  # of coordinates that are refused later
+            a, b, c = positions[triangles].swapaxes(0, 1)
+            np.add.at(normal, polygon, area := np.cross(b - a, c - a))
+            turned = np.einsum("ij,ij->i", area, normal[polygon]) < -_FLAT * (normal**2).sum(axis=1)[polygon]
+        for k in np.unique(polygon[turned]):
+            corners = first[k] + np.arange(sizes[k])
+            triangles[polygon == k] = corners[_ears(_in_plane(positions[corners], normal[k]))]
+    return triangles
 
 
+def _in_plane(positions: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Positions (N, 3) along the two axes that see most of a polygon, (N, 2), counter-clockwise."""
+    axis = int(np.abs(normal).argmax())
+    return positions[:, [axis - 2, axis - 1]] * (np.sign(normal[axis]), 1.0)
+
+
+def _ears(ring: np.ndarray) -> np.ndarray:
+    """Triangles (N - 2, 3) of a polygon (N, 2) that runs counter-clockwise; of one that crosses itself, some."""
+    left, cut = list(range(len(ring))), []
+    while len(left) > 3:
+        at = ring[left]
+        for i in range(len(left)):
+            ear = at[[i - 1, i, (i + 1) % len(left)]]
+            along = np.roll(ear, -1, axis=0) - ear
+            away = at[:, None] - ear
+            left_of = along[:, 0] * away[..., 1] - along[:, 1] * away[..., 0]
+            # What is on the rim but no corner of it would be cut off from its neighbours.
+            inside = (left_of >= 0.0).all(axis=1) & (away != 0.0).any(axis=2).all(axis=1)
+            if left_of[(i + 1) % len(left), 0] > 0.0 and not inside.any():
+                break
+        cut.append((left[i - 1], left[i], left[(i + 1) % len(left)]))
+        del left[i]
+    return np.array([*cut, left])
+
+
+_FLAT = 1e-9
+"""Share of a polygon's area by which a triangle of it may face the other way by rounding."""
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER_BYTES = 84
 
