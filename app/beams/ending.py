@@ -35,6 +35,8 @@ _COLOURED = 0.02
 """The largest such deviation where absorption has a colour."""
 _STEEP = 0.3
 """A relative change of the density over a leaf that is no longer linear."""
+_BULGING = 0.03
+"""The second order of such a change at a leaf's rim; what is left of it within the leaf is taken on average."""
 _CROOKED = 0.25
 """Share of its width that a polygon's edges may miss where it cannot be halved: it still has nearly its own area."""
 _SHARP = 0.05
@@ -161,12 +163,12 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         return
     row, first = work.count[0], work.count[2]
     new = leaf[row]
-    density_slope(beam, facets, solids, tables, source, kind, new, work)
+    bulge, mean = density_slope(beam, facets, solids, tables, source, kind, new, work)
     steepest = 0.0
     for c in range(first, first + new.corners):
         u, v = corner[c, 0] - new.centre[0], corner[c, 1] - new.centre[1]
         steepest = max(steepest, abs(new.slope[0] * u + new.slope[1] * v))
-    if room and steepest > _STEEP and beam.corners[1] > 0:
+    if room and (steepest > _STEEP or bulge > _BULGING) and beam.corners[1] > 0:
         low, high = halve_space(beam, nodes[work.top], work)
         push_both(nodes, low, high, work)
         return
@@ -183,8 +185,10 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
         even_out(beam, new, corner, work)
     if crooked:
         stand_still(beam, new, edge, corner, tables, work)
-    flux = flux_of(beam, tables, work)
+    flux = (1.0 + mean) * flux_of(beam, tables, work)
     new.flux = flux
+    for a in range(3):
+        new.density[a] *= 1.0 + mean
     work.count[0] += 1
     work.count[1] += new.edges
     work.count[2] += new.corners

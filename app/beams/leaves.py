@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from .compiling import part
-from .nodes import first_place, last_place
+from .nodes import area_of, first_place, last_place
 from .polarised import STATE
 from .rays import PARALLEL, advance, at_x, follow
 from .search import medium
@@ -211,16 +211,19 @@ def passes(solids, tables, inside, x, distance):
 
 @part
 def density_slope(beam, facets, solids, tables, source, kind, new, work):
-    """Set the slope of the leaf just written, where a light diverges or a medium absorbs, by central differences."""
+    """Set the slope of the leaf just written, where a light diverges or a medium absorbs, by central differences.
+    Returns what the density's second order adds at the outline's farthest corner, and on average, as shares of it."""
     if source.kind == PARALLEL and not work.absorbing:
-        return
+        return 0.0, 0.0
     size = 0.0
     for c in range(beam.corners[1]):
         u, v = beam.corner[1, c, 0] - beam.centre[0], beam.corner[1, c, 1] - beam.centre[1]
         size = max(size, np.sqrt(u * u + v * v))
-    if size <= 0.0 or beam.weight[1] <= 0.0:
-        return
+    if size <= 0.0 or beam.weight[1] <= 0.0 or new.density[1] <= 0.0:
+        return 0.0, 0.0
     step = 0.5 * size
+    middle = new.density[1] / (beam.boost * work.density)
+    bulge = most = 0.0
     change, at, m = work.other, work.point, work.map[0]
     position, direction = work.rays[0], work.rays[1]
     for w in range(2):
@@ -253,15 +256,20 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
                 high = value
         # Two divisions, since the product (low + high) * step may underflow where little light is left.
         change[w] = (high - low) / (low + high) / step if low + high > 0.0 else 0.0
+        second = 4.0 * (0.5 * (low + high) / middle - 1.0)
+        bulge += second
+        most = max(most, abs(second))
+    mean = bulge * area_of(beam.corner[1], beam.corners[1]) / (12.0 * size * size)
     if kind == 0:
         _, det = plane_map(facets[beam.facet], beam.position[1], beam.direction[1], m, work)
         if abs(det) < 1e-30:
-            return
+            return 0.0, 0.0
         new.slope[0] = (change[0] * m[2, 1] - change[1] * m[1, 1]) / det
         new.slope[1] = (change[1] * m[1, 0] - change[0] * m[2, 0]) / det
         plane_map(facets[beam.facet], beam.position[0], beam.direction[0], m, work)
     else:
         new.slope[0], new.slope[1] = change[0], change[1]
+    return most, min(max(mean, -0.5), 0.5)
 
 
 @part

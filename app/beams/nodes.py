@@ -12,7 +12,7 @@ import numpy as np
 from .clipping import clip_labelled
 from .compiling import part
 from .polarised import STATE, begin
-from .rays import PARALLEL, edge_line, emit, emit_straight, emitted, meet, moments, total_line
+from .rays import edge_line, emit, emitted, lengthening, meet, moments, total_line
 
 CORNERS, LINES, LEVELS = 84, 96, 160
 """Room for corners of a polygon, half-planes of a beam, facets on its path."""
@@ -259,16 +259,15 @@ def cut(beam, line, sign, flight, facet, edge, way, work):
 
 
 @part
-def lay_lines(beam, a, flight, plain, facets, tables, work, position, direction):
-    """Lay a beam's half-planes of one flight anew at place a, for rays about its centre; `plain`: 1 facets' edges
-    only, 2 others only, 3 all."""
+def lay_lines(beam, a, flight, facets, tables, work, position, direction):
+    """Lay a beam's half-planes of one flight anew at place a, for rays about its centre."""
     ready = False
     for ln in range(beam.lines):
         edge = np.int64(beam.made[ln, 2])
-        if edge in (STATIC, HALF) or beam.made[ln, 0] != flight or (plain & (1 if edge >= 0 else 2)) == 0:
+        if edge in (STATIC, HALF) or beam.made[ln, 0] != flight:
             continue
         if not ready:
-            moments(position, direction, work.moment[3])
+            moments(position, direction, work.growth, work.moment[3])
             ready = True
         line, way = beam.line[ln, a], beam.made[ln, 3]
         facet = facets[beam.made[ln, 1]]
@@ -289,6 +288,7 @@ def lay_out(beam, facets, solids, tables, source, work):
     left."""
     room, n = work.room, beam.lines
     left = False
+    lengthening(source, beam.centre[0], beam.centre[1], work.growth)
     for a in range(3):
         beam.corners[a] = beam.held[a] = 0
     for a in range(first_place(beam), last_place(beam)):
@@ -301,13 +301,7 @@ def lay_out(beam, facets, solids, tables, source, work):
                 emit(source, beam.centre[0], beam.centre[1], position, direction)
                 begin(source, direction, beam.state[a])
                 weight = emitted(source, beam.centre[0], beam.centre[1], direction)
-                if source.kind != PARALLEL:
-                    emit_straight(source, beam.centre[0], beam.centre[1], work.rays[2], work.rays[3])
-            straight = k < 0 and source.kind != PARALLEL
-            for turn in range(2 if straight else 1):
-                p = work.rays[2] if straight and turn == 0 else position
-                d = work.rays[3] if straight and turn == 0 else direction
-                lay_lines(beam, a, k + 1, (1 + turn) if straight else 3, facets, tables, work, p, d)
+            lay_lines(beam, a, k + 1, facets, tables, work, position, direction)
         beam.weight[a] = weight
         corner, side = beam.corner[a], beam.side[a]
         for c in range(4):

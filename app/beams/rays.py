@@ -84,13 +84,19 @@ def emit(source, u, v, position, direction):
 
 
 @part
-def emit_straight(source, u, v, position, direction):
-    """`emit` for a source that diverges, its directions not made unit vectors: exactly affine."""
-    for k in range(3):
-        position[0, k] = source.origin[k]
-        position[1, k] = position[2, k] = 0.0
-        direction[0, k] = source.forward[k] + u * source.right[k] + v * source.up[k]
-        direction[1, k], direction[2, k] = source.right[k], source.up[k]
+def lengthening(source, u, v, out):
+    """Relative change per unit of q of the length of forward + u right + v up: rays whose directions grow so are
+    exactly affine where they leave the source, and behind panes nearly so; unit vectors are not."""
+    out[0] = out[1] = 0.0
+    if source.kind != PARALLEL:
+        size = 0.0
+        for k in range(3):
+            towards = source.forward[k] + u * source.right[k] + v * source.up[k]
+            size += towards * towards
+            out[0] += towards * source.right[k]
+            out[1] += towards * source.up[k]
+        out[0] /= size
+        out[1] /= size
 
 
 @part
@@ -249,15 +255,18 @@ def follow(source, facets, solids, tables, path, flights, x, u, v, position, dir
 
 
 @part
-def moments(position, direction, out):
-    """A bundle's rays as lines [Pluecker]: out[c] = direction, moment X x D; their derivatives for c > 0."""
+def moments(position, direction, growth, out):
+    """A bundle's rays as lines [Pluecker]: out[c] = direction, moment X x D; their derivatives for c > 0. `growth`:
+    `lengthening`, which changes no line."""
     for c in range(3):
+        longer = growth[c - 1] if c > 0 else 0.0
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3
             moment = position[c, i] * direction[0, j] - position[c, j] * direction[0, i]
             if c > 0:
-                moment += position[0, i] * direction[c, j] - position[0, j] * direction[c, i]
-            out[c, k] = direction[c, k]
+                moment += position[0, i] * (direction[c, j] + longer * direction[0, j])
+                moment -= position[0, j] * (direction[c, i] + longer * direction[0, i])
+            out[c, k] = direction[c, k] + longer * direction[0, k]
             out[c, 3 + k] = moment
 
 

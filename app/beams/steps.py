@@ -9,7 +9,7 @@ from .ending import end
 from .flight import fly
 from .leaves import has_room
 from .nodes import copy, lay_out
-from .rays import PARALLEL, emit_straight
+from .rays import PARALLEL
 from .search import FRAGMENTS, LEAF_PIECE, LEAF_RECEIVER, SUM_NUMERIC, flux_of
 
 
@@ -20,7 +20,9 @@ def starts(beam, facets, solids, tables, source, work):
         return False
     if source.kind != PARALLEL:
         for a in range(3):
-            emit_straight(source, beam.centre[0], beam.centre[1], beam.position[a], beam.direction[a])
+            for c in range(1, 3):
+                for k in range(3):
+                    beam.direction[a, c, k] += work.growth[c - 1] * beam.direction[a, 0, k]
     beam.total = UNKNOWN
     return True
 

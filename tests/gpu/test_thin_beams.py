@@ -1,5 +1,5 @@
 """A beam thinner than a pixel keeps its light in the picture, far below what float32 tells apart; so does one that a
-border of its receiver divides."""
+border of its receiver divides. One as wide as a pane falls off as its lamp's light does."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import spectrasplat as ss
 from spectrasplat.model.geometry.primitives import box
 from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.glass import constant
@@ -63,3 +64,27 @@ def test_a_floor_in_two_parts_has_no_seam(gl, seam: float) -> None:
     ]
     found, base = (probe(gl, scene, CAUSTIC) for scene in (replace(whole, objects=(*others, *halves)), whole))
     assert picture_error(found.picture, base.picture) < 3e-3
+
+
+def test_a_pane_under_a_lamp_is_lit_as_snell_and_fresnel_say() -> None:
+    """Straight below the lamp the density's slope is 0 and its second order everything: up to 1.8 times too bright at
+    the corners, 1.27 in all, without that. Pieces of beams are off by 3 %."""
+    lamp = {"kind": "point", "position": [0, 0, 2], "intensity_cd": 1000}
+    floor = {"name": "floor", "shape": "plane", "width": 2, "height": 2, "material": {"kind": "diffuse", "colour": 1}}
+    pane = {"shape": "slab", "width": 20, "height": 20, "position": [0, 0, 1], "material": {"n_d": 1.5}}
+    camera = {"position": [0, -4, 4]}
+    scene = ss.load({"objects": [floor, pane], "lights": [lamp], "camera": camera})
+    found = ss.caustic(scene, "floor", size=(16, 16), photons=20_000).rgb @ (0.2126, 0.7152, 0.0722)
+    angle = np.linspace(0.0, 1.5, 20_001)
+    inside = np.arcsin(np.sin(angle) / 1.5)
+    cosines, bent = np.cos(angle), np.cos(inside)
+    reflected = [((a - b) / (a + b)) ** 2 for a, b in ((cosines, 1.5 * bent), (1.5 * cosines, bent))]
+    passed = 0.5 * sum((1 - r) / (1 + r) for r in reflected)  # all orders where the first one lands
+    radius = 1.9 * np.tan(angle) + 0.1 * np.tan(inside)
+    flux = np.append(0.0, np.cumsum(0.5 * (passed[1:] + passed[:-1]) * -np.diff(cosines)))
+    lux = 1000.0 * np.diff(flux) / (0.5 * np.diff(radius**2))
+    u = (np.arange(64) + 0.5) / 32.0 - 1.0
+    wanted = np.interp(np.hypot(u, u[:, None]), 0.5 * (radius[1:] + radius[:-1]), lux)
+    wanted = wanted.reshape(16, 4, 16, 4).mean(axis=(1, 3))
+    assert found.mean() == pytest.approx(wanted.mean(), rel=4e-3)
+    np.testing.assert_allclose(found, wanted, rtol=0.04)
