@@ -88,6 +88,8 @@ def test_one_horizontal_angle_is_all_the_way_round(tmp_path: Path) -> None:
         profile.intensity,
         atol=1e-12,
     )
+    with pytest.raises(UserError, match="goes on after its 91 candela"):  # of more planes than its symmetry has
+        read(tmp_path, ldt_text(lambda v, h: np.cos(np.radians(v)), np.arange(91.0), 1, 1) + "0.5\n")
     assert at(profile, 60.0, 0.0) == at(profile, 60.0, 217.0) == pytest.approx(25.0)
     assert at(profile, 91.0, 0.0) == 0.0 and profile.cone_rad == pytest.approx(0.5 * math.pi)
 
@@ -112,6 +114,7 @@ def test_forms_of_the_file(tmp_path: Path) -> None:
         isotropic().partition("TILT")[1] + isotropic().partition("TILT")[2],  # 1986: no first line
         isotropic().replace("IESNA:LM-63-1995", "IESNA91"),
         isotropic().replace("\n", "\r\n"),
+        isotropic() + "\x1a",
         isotropic().replace(" ", ",  ").replace("TILT=NONE", "TILT = NONE".replace(" ", "")),
         tilted,
         isotropic().replace("[TEST]", "[MANUFAC] Léuchte\n[TEST]"),

@@ -92,6 +92,7 @@ def test_spectra(tmp_path: Path, text: str, part: str, note: str, encoding: str)
         ("\x01\x02", "two or more rows"),
         ("3800,1\n7800,1\n", "if they are Å, write"),
         ("wavenumber cm-1,T\n13000,1\n26000,1\n", "convert it to nm"),
+        ("Frequency (Hz),P\n4e14,1\n7e14,1\n", "given over Hz"),
         ("<!DOCTYPE a [<!ENTITY b 'c'>]><a>&b;</a>", "without a document type"),
         ("<a><SpectralDistribution><SpectralData wavelength='x'>1</SpectralData></SpectralDistribution></a>", "no num"),
     ],
@@ -114,6 +115,7 @@ def test_what_is_no_spectrum(tmp_path: Path, text: str, message: str) -> None:
         ("400,20\n500,40\n700,80\n", 0.4, "per cent"),
         ("400,-0.01\n500,0.4\n700,1.01\n", 0.4, "noise"),
         ("nm,Abs\n400,2\n500,1\n700,0.3\n", 0.1, "absorbance"),
+        ("nm,R\n480,0.4\n560,0.4\n", 0.4, "reaches from 480 to 560 nm; beyond, the reflectance at its ends is used"),
     ],
 )
 def test_shares_of_light(tmp_path: Path, text: str, at_500: float, note: str | None) -> None:
@@ -121,8 +123,12 @@ def test_shares_of_light(tmp_path: Path, text: str, at_500: float, note: str | N
     scene = made(tmp_path, {"kind": "diffuse", "reflectance": {"csv": "paint.csv"}})
     assert scene.objects[0].material.reflectance[120] == pytest.approx(at_500)
     assert any(note in each for each in scene.notes) if note else not any("paint.csv" in each for each in scene.notes)
-    through = made(tmp_path, {"n_d": 1.5, "absorption": {"csv": "paint.csv", "distance": 2.0}})
+    tinted = {"n_d": 1.5, "absorption": {"csv": "paint.csv", "distance": 2.0}}
+    through = made(tmp_path, tinted)
     assert through.objects[0].material.absorption.coefficient[120] == pytest.approx(-np.log(at_500) / 2.0)
+    (tmp_path / "paint.csv").write_text("nm,alpha (1/cm)\n400,0.2\n700,0.1\n")
+    with pytest.raises(UserError, match="is no transmittance"):
+        made(tmp_path, tinted)
 
 
 def made(folder: Path, material: dict | str):
@@ -181,6 +187,7 @@ def test_indices(tmp_path: Path, name: str, text: str | bytes, material: dict | 
         ("own.agf", AGF.replace("1.0396", "one"), "own.agf", "no number"),
         ("own.agf", AGF, "own.agv:MYGLASS", "unknown glass"),
         ("own.agf", AGF, "none.agf:MYGLASS", "is not a file"),
+        ("own.agf", AGF.replace("CD ", "CC "), "own.agf", "has no coefficients"),
         ("n.yml", "a: [", "n.yml", "not whole YAML"),
         ("n.yml", "DATA: 3", "n.yml", "no table or formula of n"),
         ("n.csv", "wl,a,b\n0.4,1,2\n0.7,1,2\n", "n.csv", "holds 'a', 'b'; name the one that is n"),

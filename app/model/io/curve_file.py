@@ -37,7 +37,11 @@ _WAVELENGTH = re.compile(
     r"wave|^wl\b|lambda|λ|^nm\b|[\[(]nm[\])]|wellenl|longueur|longitud|lunghezza|波长|波長", re.IGNORECASE
 )
 _UNITS_NM = {r"µm|μm|\bum\b|micro[nm]|mikrom": 1e3, r"\bnm\b|nanom": 1.0, r"å|angstr": 0.1}
-_OTHER_UNITS = re.compile(r"cm ?\^?[-⁻−] ?[1¹]|1/cm|wavenumber|\bthz\b|\bev\b", re.IGNORECASE)
+_OTHER_UNITS = re.compile(r"cm ?\^?[-⁻−] ?[1¹]|1/cm|wavenumber|\b[tgmk]?hz\b|\bev\b", re.IGNORECASE)
+_NO_SHARE = re.compile(r"abs\w* coeff|absorptionsk|\balpha\b|α|1/[cmµ]?m\b|[cm]m ?\^?[-−⁻][1¹]|\bdb\b", re.IGNORECASE)
+"""What absorbs per length, and decibels."""
+_SEEN_NM = 400.0, 700.0
+"""Less than a thousandth of white light's luminance lies beyond."""
 _MAX_BYTES = 4 << 20
 _LEAST_ACROSS = 8
 """Wavelengths in one row that make it the heading of a table with a curve in each row below."""
@@ -115,6 +119,12 @@ def read_curves(path: Path, notes: list[str], part: str = "") -> list[Curve]:
     return curves
 
 
+def note_ends(path: PathLike, curve: Curve, beyond: str, notes: list[str]) -> None:
+    """Say what is taken `beyond` the ends of a curve that leaves out some of what is seen."""
+    if curve.nm[0] > _SEEN_NM[0] or curve.nm[-1] < _SEEN_NM[1]:
+        notes.append(f"{path}: it reaches from {curve.nm[0]:g} to {curve.nm[-1]:g} nm; beyond, {beyond}.")
+
+
 def clipped(path: PathLike, curve: Curve, what: str, notes: list[str], most: float = math.inf) -> np.ndarray:
     """Values of `curve` from 0 to `most`; what noise has put beyond them is clipped and goes to `notes`.
 
@@ -137,8 +147,11 @@ def clipped(path: PathLike, curve: Curve, what: str, notes: list[str], most: flo
 
 def share(path: PathLike, curve: Curve, what: str, notes: list[str]) -> np.ndarray:
     """Values of `curve` as shares from 0 to 1, given as such, in per cent or as absorbance; transmittance above 0."""
+    note_ends(path, curve, f"the {what} at its ends is used", notes)
     values, highest = curve.values, float(np.interp(VISIBLE_NM, curve.nm, curve.values).max())
-    if re.search(r"\babs\b|absorbance|extinktion|optical density", curve.name, re.IGNORECASE):
+    if other := _NO_SHARE.search(curve.name):
+        raise UserError(f"{path}: '{curve.name}' is no {what} ('{other[0]}'); give shares, or per cent, of the light")
+    if re.search(r"\babs\b|absorbance|extinktion|optical density|\bod\b", curve.name, re.IGNORECASE):
         notes.append(f"{path}: '{curve.name}' was taken as absorbance, minus the decimal logarithm of transmittance.")
         values = 10.0 ** -np.clip(values, -300.0, 300.0)
     elif "%" in curve.name or 2.0 < highest <= 150.0:
@@ -305,7 +318,7 @@ def _in_order(path: PathLike, name: str, unit: str, nm: Any, values: Any, notes:
         at = x[places[apart.argmax()]]
         raise UserError(f"{path}: there are different values of '{name}' at {at:g} nm; remove all but one")
     if x[-1] < VISIBLE_NM[0] or x[0] > VISIBLE_NM[-1]:
-        hint = "; if they are Å, write 'wavelength (Å)' above them" if x[0] > 1000.0 else ""
+        hint = "; if they are Å, write 'wavelength (Å)' above them" if 3800.0 <= x[-1] <= 12000.0 else ""
         raise UserError(
             f"{path}: its wavelengths, {x[0]:g} to {x[-1]:g} nm, are outside the visible 380 to 780 nm{hint}"
         )

@@ -123,7 +123,7 @@ def read_ies(path: str | os.PathLike[str]) -> Profile:
             raise UserError(
                 f"{path} is longer than {MAX_BYTES >> 20} MiB, as no lamp's file is; choose a .ies or .ldt file"
             )
-        text = files.read_any_text(path, MAX_BYTES)
+        text = files.read_any_text(path, MAX_BYTES).replace("\x1a", "")  # the end of a file, to DOS
     except OSError as error:
         raise UserError(f"{path} cannot be read: {error.strerror}; choose another file") from error
     # By content: EULUMDAT's second and third line are whole numbers, and LM-63 has a line TILT=.
@@ -144,6 +144,8 @@ class _Numbers:
         """With the symmetries written out: all the way round, and dark before the first vertical angle.
 
         `images`: signs and turns (deg) that make all horizontal angles of those that are listed."""
+        if self._next < len(self._words):
+            raise self._error(f"goes on after its {candela.size} candela, so its counts of angles are wrong")
         if not (candela.min() >= 0.0 and candela.max() <= MAX_MAGNITUDE):
             raise self._error("has candela, or a factor on them, that are negative or too large")
         if candela.max() <= 0.0:
@@ -234,8 +236,6 @@ class _Lm63(_Numbers):
         vertical = self._angles(verticals, "vertical")
         horizontal = self._angles(horizontals, "horizontal")
         candela = np.array(self._take(verticals * horizontals, "candela")).reshape(horizontals, verticals)
-        if self._next < len(self._words):
-            raise self._error(f"goes on after its {verticals * horizontals} candela, so its counts of angles are wrong")
         with np.errstate(over="ignore", invalid="ignore", under="ignore"):
             candela = candela * multiplier * ballast * ballast_lamp
         first, last = horizontal[0], horizontal[-1]

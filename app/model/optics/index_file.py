@@ -152,6 +152,8 @@ def _from_agf(path: Path, name: str, notes: list[str]) -> Dispersion:
             f"{path} has no glass '{name}'{listed}" if name else f'{path}: which glass ("{path.name}:NAME"){listed}'
         )
     lines, where = glasses[found], f"{path}: {found}"
+    if not lines.get("CD"):
+        raise UserError(f"{where} has no coefficients (a line CD); export the catalogue again")
     number, *stated = _numbers(lines["NM"][1:2] + lines["NM"][3:4], where)
     kind, coefficients = _as_published(int(number), [*_numbers(lines.get("CD", []), where), *[0.0] * 10][:10], where)
     dispersion = glass.from_formula(kind, coefficients, found, _range_nm(lines.get("LD", [])[:2], where), where)

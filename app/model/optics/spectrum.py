@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.errors import UserError, suggestion
-from ..io.curve_file import clipped, read_curve
+from ..io.curve_file import clipped, note_ends, read_curve
 from .colorimetry import K_M, VISIBLE_NM, cmf_xyz, illuminant_table, xyz_to_rgb709
 
 _PLANCK_2HC2 = 1.191042972e-16
@@ -207,6 +207,7 @@ def from_csv(path: str | os.PathLike[str], notes: list[str] | None = None) -> Sp
     notes = [] if notes is None else notes
     curve = read_curve(path, notes)
     spectrum = from_table(curve.nm, clipped(path, curve, "power", notes), where=os.fspath(path))
+    note_ends(path, curve, "it is taken as dark", notes)
     if spectrum.power_w() == 0.0:
         raise UserError(f"{os.fspath(path)}: the spectrum is zero from 380 to 780 nm; choose another")
     return spectrum
