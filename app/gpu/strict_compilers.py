@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import tempfile
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 from ..base.errors import UserError
@@ -28,7 +29,8 @@ _MOST_UNROLLED = 32
 _LOOP = re.compile(r"\bfor \(u?int (\w+) = 0u?; \1 < (?:uint\()?(\w+?)u?\)?; \+\+\1\)")
 _BODY = re.compile(r"\s*(?:[^{;]*;|\{(?:[^{}]|\{[^{}]*\})*\})")
 """A statement, or a block with none but flat ones in it."""
-_REFLECTION = "Uniform block reflection:"
+_LINKED, _REFLECTION = "\nLinked ", "Uniform block reflection:"
+_STAGES = ".comp", ".vert", ".geom", ".frag"
 _NODE = re.compile(r"\d+:(\d+)( +)(.*)")
 """Of a syntax tree: line, depth, what it is."""
 _QUALIFIED_RECORD = re.compile(r"[^{]*\b(?:restrict|readonly|writeonly|coherent)\b[^{]*\bstructure\{")
@@ -52,36 +54,47 @@ def complaints(built: Built) -> list[str]:
     """What front end and validator say against a program, with files and lines; empty where they accept it.
 
     Raises `UserError` where they are not installed or hang."""
+    code, output = _read(built)
+    said = [line for line in output.splitlines() if line.startswith(("ERROR:", "WARNING:"))]
+    if said or code:  # what does not compile need not be translated
+        return [_located(built, line) for line in said or [_ended(FRONT_END, code, output)]]
     with tempfile.TemporaryDirectory() as folder:
-        files = _written(built, Path(folder))
-        said = [*_run(FRONT_END, "-l", *files)]
-        if said:  # what does not compile need not be translated
-            return [_located(built, line) for line in said]
-        for file in files:
-            said += _refused_by_nvidia(file)
+        said = _refused_by_nvidia(output.partition(_LINKED)[0])
+        for file in _written(built, Path(folder)):
             said += _run(*_translation(file))
             said += _run(VALIDATOR, "--target-env", _ENVIRONMENT, f"{file}.spv")
     return [_located(built, line) for line in said]
 
 
-def _refused_by_nvidia(file: str) -> list[str]:
-    said, above = [], [(-1, "")]
-    for number, indent, node in _NODE.findall(_output(FRONT_END, "-i", file)[1]):
+def _refused_by_nvidia(trees: str) -> list[str]:
+    """By the syntax trees of all stages, each after its file's name."""
+    said, above, file = [], [(-1, "")], ""
+    for line in trees.splitlines():
+        node = _NODE.match(line)
+        if node is None:
+            file = line if line.endswith(_STAGES) else file
+            continue
+        number, indent, words = node.groups()
         while above[-1][0] >= len(indent):
             above.pop()
         for begin, (refused, why) in _REFUSED.items():
-            if above[-1][1].startswith(begin) and refused.match(node):
+            if above[-1][1].startswith(begin) and refused.match(words):
                 said.append(f"ERROR: {file}:{number}: {why}")
-        above.append((len(indent), node))
+        above.append((len(indent), words))
     return said
 
 
 def blocks(built: Built) -> set[str]:
     """Names of the uniform and storage blocks that the front end finds in use, all stages together."""
-    with tempfile.TemporaryDirectory() as folder:
-        output = _output(FRONT_END, "-q", "-l", *_written(built, Path(folder)))[1]
-    _, _, after = output.partition(_REFLECTION)
+    _, _, after = _read(built)[1].partition(_REFLECTION)
     return {line.partition(":")[0] for line in after.strip().split("\n\n")[0].splitlines() if ": offset" in line}
+
+
+@lru_cache(maxsize=1)
+def _read(built: Built) -> tuple[int, str]:
+    """The front end's exit code, and complaints, syntax trees and blocks in use."""
+    with tempfile.TemporaryDirectory() as folder:
+        return _output(FRONT_END, "-l", "-i", "-q", *_written(built, Path(folder)))
 
 
 def live_states(built: Built) -> tuple[LiveState, ...]:
@@ -135,7 +148,11 @@ def _run(*command: str) -> list[str]:
     """The lines of a tool's complaint; none where it has none."""
     code, output = _output(*command)
     lines = [line for line in output.splitlines() if re.search(r"\b(?:error|warning)\b", line, re.IGNORECASE)]
-    return lines or ([f"{command[0]} ended with {code}: {output.strip()[-300:]}"] if code else [])
+    return lines or ([_ended(command[0], code, output)] if code else [])
+
+
+def _ended(tool: str, code: int, output: str) -> str:
+    return f"{tool} ended with {code}: {output.strip()[-300:]}"
 
 
 def _output(*command: str) -> tuple[int, str]:

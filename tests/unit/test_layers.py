@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -48,12 +49,10 @@ def modules(root: Path) -> dict[str, Path]:
     return found
 
 
-def imports(name: str, file: Path, known: dict[str, Path]) -> Iterator[tuple[str, int, bool]]:
-    """(module, line, at start-up) of every import of this package in a file: types and late imports are arrows too."""
-    tree = _parsed(file)
-    late = {id(inner) for outer in ast.walk(tree) if _is_late(outer) for inner in ast.walk(outer)}
+def imports(name: str, file: Path, known: dict[str, Path]) -> Iterator[tuple[str, int]]:
+    """(module, line) of every import of this package in a file: types and late imports are arrows too."""
     package = name.split(".") if file.name == "__init__.py" else name.split(".")[:-1]
-    for node in ast.walk(tree):
+    for node in ast.walk(_parsed(file)):
         if not isinstance(node, ast.ImportFrom):
             continue
         if node.level:
@@ -65,14 +64,7 @@ def imports(name: str, file: Path, known: dict[str, Path]) -> Iterator[tuple[str
         path = [part for part in (node.module or "").split(".") if part and part != "spectrasplat"]
         for alias in node.names:
             target = ".".join([*base, *path, alias.name])
-            yield target if target in known else ".".join([*base, *path]), node.lineno, id(node) not in late
-
-
-def _is_late(node: ast.AST) -> bool:
-    """Not run when the module is imported: a function's body, or `if TYPE_CHECKING`."""
-    if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
-        return True
-    return isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING"
+            yield target if target in known else ".".join([*base, *path]), node.lineno
 
 
 @cache
@@ -90,7 +82,7 @@ def upward(root: Path) -> list[str]:
         if room in FACE:
             continue
         assert room in floor, f"{file.relative_to(root)} stands in no room; rooms are {', '.join(floor)}"
-        for target, line, _ in imports(name, file, known):
+        for target, line in imports(name, file, known):
             other = target.split(".")[0]
             if other in ("", *FACE) or other == room or (room, other) in BESIDE:
                 continue
@@ -99,39 +91,15 @@ def upward(root: Path) -> list[str]:
     return found
 
 
-def circles(root: Path, *, only_start_up: bool) -> list[list[str]]:
-    """Modules that import each other in a loop (strongly connected components of more than one, by Tarjan 1972)."""
+def circle(root: Path) -> list[str]:
+    """Modules that import each other in a loop; empty where none do."""
     known = modules(root)
-    arrows = {
-        name: sorted({t for t, _, early in imports(name, file, known) if t in known and (early or not only_start_up)})
-        for name, file in known.items()
-    }
-    number: dict[str, int] = {}
-    low: dict[str, int] = {}
-    stack: list[str] = []
-    found: list[list[str]] = []
-
-    def visit(name: str) -> None:
-        number[name] = low[name] = len(number)
-        stack.append(name)
-        for target in arrows[name]:
-            if target == name:
-                continue
-            if target not in number:
-                visit(target)
-                low[name] = min(low[name], low[target])
-            elif target in stack:
-                low[name] = min(low[name], number[target])
-        if low[name] == number[name]:
-            at = stack.index(name)
-            if len(stack) - at > 1:
-                found.append(sorted(stack[at:]))
-            del stack[at:]
-
-    for name in arrows:
-        if name not in number:
-            visit(name)
-    return found
+    arrows = {name: {t for t, _ in imports(name, file, known) if t in known} - {name} for name, file in known.items()}
+    try:
+        TopologicalSorter(arrows).prepare()
+    except CycleError as error:
+        return error.args[1]
+    return []
 
 
 def test_no_arrow_runs_upward() -> None:
@@ -139,8 +107,7 @@ def test_no_arrow_runs_upward() -> None:
 
 
 def test_no_file_imports_in_a_circle() -> None:
-    found = circles(APP, only_start_up=False)
-    assert not found, "\n".join(" → ".join(circle) for circle in found)
+    assert not circle(APP), " → ".join(circle(APP))
 
 
 @pytest.mark.parametrize(
@@ -165,5 +132,4 @@ def test_a_circle_is_named(tmp_path: Path) -> None:
     (tmp_path / "model").mkdir()
     (tmp_path / "model" / "a.py").write_text("from .b import x\n")
     (tmp_path / "model" / "b.py").write_text("def f():\n    from . import a\n")
-    assert circles(tmp_path, only_start_up=False) == [["model.a", "model.b"]]
-    assert circles(tmp_path, only_start_up=True) == []
+    assert set(circle(tmp_path)) == {"model.a", "model.b"}
