@@ -19,7 +19,7 @@ from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, GoOn, Search, hidden_from, search
 from .leaves import Leaves
 from .polygons import WIDE, BeamPieces, BeamPolygons, joined
-from .search import SUM_BEAMS, SUMS
+from .search import SUM_BEAMS, SUM_LEAVES, SUMS
 from .sources import emissions, is_near_facets, mask_at, why_no_beams
 
 LIGHT_PARTS = 16, 32, 64
@@ -27,6 +27,9 @@ LIGHT_PARTS = 16, 32, 64
 
 SURVEY_PARTS, MOVING_PARTS = 4, 1
 """Points that represent an extended light in a survey, and in motion."""
+
+_USUAL = 6.0
+"""Beams, polygons and pieces for each beam that is followed, at most, where beams are not cut into many."""
 
 
 @dataclass
@@ -45,6 +48,11 @@ class LightBeams:
     def followed(self, light: int | None = None) -> float:
         """Beams followed, of one light or of all."""
         return float(sum(sums[SUM_BEAMS] for i, sums in self.sums.items() if light in (None, i)))
+
+    def spent(self) -> float:
+        """Beams of a usual scene that take as long to be found and drawn, with the polygons and pieces they leave."""
+        leaves = float(sum(sums[SUM_LEAVES] for sums in self.sums.values()))
+        return max(self.followed(), (self.followed() + leaves) / _USUAL)
 
 
 class BeamFinder:

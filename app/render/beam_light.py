@@ -64,6 +64,9 @@ Counted, not timed: a scene is rendered alike on every machine."""
 MANY = 800.0
 """Beams of a survey above which photons carry all where weak beams play roulette, which is noisier: the tail of a cut
 stone holds much of its picture."""
+_LITTLE, _MANY_CUTS = 0.01, 4.0
+"""Share of what beams leave to photons, and beams' worth of work for each that is followed: where a survey's land less
+and take more, photons draw the picture and beams only take time."""
 _STEP_FACETS = 60
 """A step costs as much as it takes to test so many facets, besides those of the scene."""
 _PICTURE_SHARE = 0.125
@@ -198,13 +201,17 @@ class BeamLight:
                 "weak beams of lights with emission lines over a continuum are so many that photons leave less noise"
             )
             return
-        if _left(strongest) > sum(float(sums[SUM_DEPOSITED]) for sums in strongest.sums.values()):
+        lands, goes_on = (sum(float(sums[k]) for sums in strongest.sums.values()) for k in (SUM_DEPOSITED, SUM_LEFT))
+        if _left(strongest) > lands:
             self.why_not = "most of their light lands on what is not flat, which photons draw"
+            return
+        if at < SURVEY and lands < _LITTLE * goes_on and strongest.spent() > _MANY_CUTS * strongest.followed():
+            self.why_not = "they are cut into so many that hardly any gets as far as a receiver"
             return
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
-        with_tails = strongest.followed() * (at / SURVEY) ** _GROWTH_WITH_TAILS
-        self._surveyed, self._with_tails = max(1.0, found.followed() * to_survey), max(1.0, with_tails)
+        with_tails = strongest.spent() * (at / SURVEY) ** _GROWTH_WITH_TAILS
+        self._surveyed, self._with_tails = max(1.0, found.spent() * to_survey), max(1.0, with_tails)
         self._beams_a_point = self._with_tails / light_parts
         if strongest.polygons is not None:
             self._light_parts = parts_for(strongest.polygons, self._watts(strongest.polygons), light_parts)
@@ -278,9 +285,9 @@ class BeamLight:
             found = yield from mapped(timed(search, partial(stats.count, "find_seconds")), lambda share: 0.5 * share)
             # Where light leaves the scene soon, fewer weak beams follow than expected: the search is done again, finer.
             # No later pass uses what is learnt here: a pass must not depend on those before it.
-            followed = found.followed()
-            surveyed, finest = max(followed, 1.0) * (threshold / SURVEY) ** growth, _finest(threshold, followed)
-            enough = _ENOUGH * followed * self._photons_a_beam >= photons
+            spent = found.spent()
+            surveyed, finest = max(spent, 1.0) * (threshold / SURVEY) ** growth, _finest(threshold, spent)
+            enough = _ENOUGH * spent * self._photons_a_beam >= photons
             if enough or self._threshold(photons, surveyed, growth) >= threshold:
                 break
         self.found = found

@@ -190,6 +190,43 @@ def test_lines_over_a_continuum_go_by_photons(gl, tmp_path: Path) -> None:
         assert light.survey.beams is None and "continuum" in light.survey.beam_light.why_not
 
 
+TANK = """
+[[lights]]
+kind = "point"
+position = [-0.5, 0.3, 6.0]
+[[objects]]
+name = "water"
+shape = "box"
+size = [10.0, 10.0, {height}]
+position = [0.0, 0.0, {middle}]
+material = {{ kind = "glass", glass = "water", absorption = {{ colour = [0.3, 0.6, 0.9], distance = 1.0 }} }}
+[[objects]]
+name = "prism"
+shape = "prism"
+side = 0.6
+length = 0.7
+glass = "N-SF11"
+position = [0.2, 0.0, 1.5]
+rotation_deg = [0, 15, 0]
+[[objects]]
+name = "table"
+shape = "plane"
+width = 5.0
+height = 5.0
+material = "diffuse"
+"""
+
+
+def test_beams_that_are_cut_to_nothing_are_left_to_photons(gl, tmp_path: Path) -> None:
+    """A lamp over a tank as wide as the scene: rays through its one facet are so far from parallel that hardly any
+    piece of it is followed down to the table. A slab of water over the table's light keeps its beams."""
+    for height, middle, by_beams in ((5.0, 1.0, False), (0.1, 3.0, True)):
+        (tmp_path / "tank.toml").write_text(TANK.format(height=height, middle=middle))
+        with passed(gl, load_scene(tmp_path / "tank.toml"), photons=2000) as light:
+            assert (light.survey.beams is not None) == by_beams, light.survey.beam_light.why_not
+            assert by_beams or "cut into so many" in light.survey.beam_light.why_not
+
+
 def test_what_is_kept_to_be_shown_again_holds_no_tail(gl, tmp_path: Path) -> None:
     """Weak beams play roulette when they are drawn again: kept tails, 8 % of the light, would count twice."""
     with passed(gl, stone(tmp_path)) as light:
