@@ -77,10 +77,10 @@ def loaded(tmp_path: Path) -> Scene:
 
 @pytest.mark.parametrize("path", ["objects.ball.n_d", "objects.ball.position.x"])
 def test_of_a_ball(gl, tmp_path: Path, path: str) -> None:
-    """Within 4 % of the norm by 60,000 photons, most of which is chance of both."""
+    """Within 4 % of the norm by 40,000 photons, most of which is chance of both."""
     scene = loaded(tmp_path)
-    found = gradient_of(gl, scene, path, settings(60_000))
-    expected = difference(gl, scene, path, found, settings(120_000, seed=7))
+    found = gradient_of(gl, scene, path, settings(40_000))
+    expected = difference(gl, scene, path, found, settings(80_000, seed=7))
     assert relative(found.derivatives[0].picture.rgb, expected, 1.0) < 0.04
 
 
