@@ -205,7 +205,7 @@ class BeamLight:
         if _left(strongest) > lands:
             self.why_not = "most of their light lands on what is not flat, which photons draw"
             return
-        if at < SURVEY and lands < _LITTLE * goes_on and strongest.spent() > _MANY_CUTS * strongest.followed():
+        if lands < _LITTLE * goes_on and strongest.spent() > _MANY_CUTS * strongest.followed():
             self.why_not = "they are cut into so many that hardly any gets as far as a receiver"
             return
         self.found, self._survey_polygons = found, found.polygons

@@ -147,8 +147,8 @@ def test_photons_carry_what_beams_leave_in_a_scene_of_any_size(gl, tmp_path: Pat
         share, in_map = landing(alone), landing(alone) * held(alone)
     with passed(gl, scene) as by_beams:
         assert by_beams.survey.only_beams and by_beams.trace.rays_traced > PHOTONS / 4
-        stats, tally = by_beams.beam_stats, by_beams.stats.tally
-        assert stats is not None and 0.01 < stats.left_w / stats.entered_w < 0.7
+        stats, tally = by_beams.survey.beams.stats, by_beams.stats.tally
+        assert 0.01 < stats.left_w / stats.entered_w < 0.7
         # What beams say they left, and what photons took up.
         assert abs(tally.carried_on) < 0.01 * stats.left_w * PHOTONS
         assert tally.roulette == pytest.approx(0.0, abs=2e-3 * tally.emitted)
