@@ -31,7 +31,7 @@ from spectrasplat.model.scene import Scene
 from spectrasplat.passes.display import Display
 from spectrasplat.render.viewer.engine import LiveEngine
 
-SIZE = (96, 54)
+SIZE = (160, 90)
 FRAME_S = 1 / 60
 PATIENCE_S = 300.0
 QUIET_MS = 0.65
@@ -99,7 +99,7 @@ def beside_driver() -> Iterator[Callable[[], float]]:
 class ViewerRig:
     """The live engine on a scene, and the picture on its way to the window."""
 
-    def __init__(self, context: Context, scene: Scene, size: tuple[int, int] = SIZE, photons: int = 1 << 13) -> None:
+    def __init__(self, context: Context, scene: Scene, size: tuple[int, int] = SIZE, photons: int = 1 << 14) -> None:
         self.engine = LiveEngine(context, Budget(photons, photons, photons, 1 << 26))
         self.engine.target_photons = photons
         self.engine.refine_when_still = False
