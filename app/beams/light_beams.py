@@ -111,6 +111,12 @@ class BeamFinder:
             if why_no_beams(light) is None and not (light.is_parallel and self._is_thin(light)) and i not in self._near
         ]
 
+    @property
+    def broadest(self) -> float:
+        """Half the extent of the broadest lamp, GPU units; the glass has about unit radius."""
+        lamps = (self._scene.lights[i] for i in self.lights)
+        return max((max(lamp.half_extent) * self._unit for lamp in lamps if not lamp.is_parallel), default=0.0)
+
     def _is_thin(self, light: Light) -> bool:
         """Whether a parallel light is too thin for its beams to be distinguished from nothing: photons carry it."""
         return light.has_place and min(light.half_extent) * self._unit < _THINNEST
@@ -201,19 +207,21 @@ class BeamFinder:
         return self._hidden[i]
 
 
-def parts_for(polygons: BeamPolygons, watts: np.ndarray, parts: int) -> int:
+def parts_for(polygons: BeamPolygons, watts: np.ndarray, parts: int, broadest: float) -> int:
     """The fewest of `LIGHT_PARTS` points of extended lights with which nearly all polygons that can be wider than their
-    penumbrae are so: a narrower one is blurred alike in all directions. `polygons` are of lights of so many `parts`,
-    and hold `watts` (N,)."""
+    penumbrae are so: a narrower one is blurred alike in all directions. Where few can, the most for a lamp broader than
+    the glass (`broadest`), which is then a pinhole. `polygons` are of lights of `parts` points, with `watts` (N,)."""
+    otherwise = LIGHT_PARTS[-1 if broadest > 1.0 else 0]
     if not len(polygons):
-        return LIGHT_PARTS[0]
+        return otherwise
     soft = np.maximum.reduceat(polygons.edges[:, [3, 7]].max(axis=1), polygons.edge_start[:-1])
     low, high = (f.reduceat(polygons.hulls, polygons.hull_start[:-1]) for f in (np.minimum, np.maximum))
     longest = np.linalg.norm(high - low, axis=1) - 2.0 * math.sqrt(2.0) * soft
     width = polygons.area / np.maximum(longest, np.sqrt(polygons.area) + 1e-12)
     needed = parts * (_ROOM * WIDE * 2.0 * soft / np.maximum(width, 1e-12)) ** 2
     held = [watts[needed <= count].sum() for count in LIGHT_PARTS]
-    return LIGHT_PARTS[int(np.argmax(np.array(held) >= _MOST_WIDE * max(held[-1], 0.5 * watts.sum())))]
+    enough = _MOST_WIDE * max(held[-1], 0.5 * watts.sum())
+    return next((count for count, w in zip(LIGHT_PARTS, held, strict=True) if w >= enough), otherwise)
 
 
 _MOST_WIDE, _ROOM = 0.99, 1.5

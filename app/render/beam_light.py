@@ -214,7 +214,8 @@ class BeamLight:
         self._surveyed, self._with_tails = max(1.0, found.spent() * to_survey), max(1.0, with_tails)
         self._beams_a_point = self._with_tails / light_parts
         if strongest.polygons is not None:
-            self._light_parts = parts_for(strongest.polygons, self._watts(strongest.polygons), light_parts)
+            watts = self._watts(strongest.polygons)
+            self._light_parts = parts_for(strongest.polygons, watts, light_parts, self.finder.broadest)
 
     @property
     def leaves_strong(self) -> bool:

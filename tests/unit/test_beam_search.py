@@ -14,7 +14,7 @@ from spectrasplat.base.paths import assets_dir
 from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
 from spectrasplat.beams.leaves import Leaves
-from spectrasplat.beams.light_beams import BeamFinder
+from spectrasplat.beams.light_beams import LIGHT_PARTS, BeamFinder, parts_for
 from spectrasplat.beams.search import LEAF_PIECE, LEAF_RECEIVER, NARROWEST, SUM_ENTERED, SUM_ROULETTE
 from spectrasplat.beams.sources import RIM, _places, emissions
 from spectrasplat.model.io.scene_file import load_scene
@@ -269,6 +269,18 @@ def test_what_a_ball_hides_from_some_points_of_a_lamp_is_left_to_photons_by_ever
     finder = BeamFinder(rig.scene, rig.meshes, {}, {}, rig.axis, lambda p: np.asarray(p, float), 1.0)
     found = {count: finished(finder.find(1e-2, 16, 1, count)) for count in (4, 16)}
     assert found[4].carried == found[16].carried == {0: ()}
+
+
+def test_a_lamp_broader_than_the_glass_is_as_many_points_as_can_be() -> None:
+    """Each point's light is a narrow picture of the glass, then, and the whole is one of the lamp: with the fewest,
+    where a survey had found no polygon as wide as its penumbra, parts of it were 86 % too dark."""
+    counts = []
+    for size in ((1.0, 1.0), (4.0, 0.1)):
+        rig = Rig(scene_of(lamp((0.0, 0.0, 20.0), (0.0, 0.0, -1.0), size, "area") + PANE_ABOVE))
+        finder = BeamFinder(rig.scene, rig.meshes, {}, {}, rig.axis, lambda p: np.asarray(p, float), 1.0)
+        polygons = finished(finder.find(1e-2, 16, 1, 4)).polygons
+        counts.append(parts_for(polygons.take(np.zeros(0, int)), np.zeros(0), 4, finder.broadest))
+    assert counts == [LIGHT_PARTS[0], LIGHT_PARTS[-1]]
 
 
 def test_a_box_ends_beams_and_its_light_is_left_to_photons() -> None:
