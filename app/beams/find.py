@@ -197,7 +197,9 @@ def _work(scene: BeamScene, emission: Emission, how: Search, share: float, sourc
     work = np.zeros(1, WORK)
     work["power"], work["seed"], work["depth"] = len(scene.tables), how.seed, how.depth
     work["density"], work["tolerance"], work["drift"] = emission.density, how.tolerance, how.drift
-    work["line_share"], work["room"], work["absorbing"] = share, emission.room, scene.absorbs
+    # A room's own sides are lines, which must cut: it may have neighbours.
+    work["room"] = emission.room * (1.0, 1.0, 1.5)
+    work["line_share"], work["absorbing"] = share, scene.absorbs
     work["disperses"], work["coloured"] = scene.disperses, scene.absorbs or scene.coloured
     work["objects"], work["sources"] = len(scene.solids), sources
     return work
@@ -238,7 +240,6 @@ def _roots(
     root["line"][: len(limits)] = limits[:, None, :]
     root["made"][: len(square)] = 0, 0, HALF, 1
     root["made"][len(square) : len(limits)] = 0, 0, STATIC, 1
-    work["room"] = emission.room * (1.0, 1.0, 1.5)
     store, whole = Store(), [stack[FIRST : FIRST + 1].copy()]
     found: list[np.ndarray] = []
     while whole:

@@ -53,6 +53,9 @@ EDGE = np.dtype(
     ]
 )
 
+_DARK = 1e-200
+"""Density whose relative changes may overflow."""
+
 
 @dataclass(frozen=True)
 class Leaves:
@@ -219,7 +222,7 @@ def density_slope(beam, facets, solids, tables, source, kind, new, work):
     for c in range(beam.corners[1]):
         u, v = beam.corner[1, c, 0] - beam.centre[0], beam.corner[1, c, 1] - beam.centre[1]
         size = max(size, np.sqrt(u * u + v * v))
-    if size <= 0.0 or beam.weight[1] <= 0.0 or new.density[1] <= 0.0:
+    if size <= 0.0 or beam.weight[1] <= 0.0 or new.density[1] < _DARK:
         return 0.0, 0.0
     step = 0.5 * size
     middle = new.density[1] / (beam.boost * work.density)

@@ -19,6 +19,7 @@ from .facets import beam_scene, in_gpu_space, shown_as
 from .find import Emission, GoOn, Search, hidden_from, search
 from .leaves import Leaves
 from .polygons import WIDE, BeamPieces, BeamPolygons, joined
+from .rays import PARALLEL
 from .search import SUM_BEAMS, SUM_LEAVES, SUMS
 from .sources import emissions, is_near_facets, mask_at, why_no_beams
 
@@ -247,4 +248,5 @@ def _reach(emission: Emission) -> float:
     side = 2.0 * emission.room[2]
     if len(emission.limits) > 3:
         side = min(side, 2.0 * math.sqrt(abs(float(np.median(emission.limits[:, 0]))) + 1e-12))
-    return emission.density * side * side
+    away = 0.0 if emission.source["kind"][0] == PARALLEL else float(np.hypot(*emission.room[:2]))
+    return emission.density * side * side / (1.0 + away**2) ** 1.5

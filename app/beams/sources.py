@@ -20,7 +20,9 @@ RIM = 64
 """Corners of the polygon that represents a round aperture or a cone, of the same area: its sides are at most 0.04 % of
 the radius inside of the circle, its corners 0.08 % outside."""
 _WIDEST = math.tan(math.radians(75.0))
-"""Half side of a gnomonic plane up to which one is enough; else the six sides of a cube are taken."""
+"""Half side of a gnomonic plane up to which one is enough, turned anyhow."""
+_WIDEST_ALONG = 100.0
+"""Half side of one along a facet, in tiles; beyond, the six sides of a cube are taken."""
 _NEAREST = 1.65
 """Least distance of a facet, in half extents of an extended lamp: from nearer ones penumbrae are wider than what casts
 them, and more would be drawn than lands."""
@@ -96,7 +98,8 @@ def emissions(
         "mask": inside,
     }
     make = _parallel if light.is_parallel else _diverging
-    return make(light, corners, to_gpu, unit, parts, common)
+    facets = scene.facets[scene.facets["kind"] < BLACK]
+    return make(light, corners, facets["plane"][np.argmax(facets["radius"]), :3], to_gpu, unit, parts, common)
 
 
 def colour_edges(scene: BeamScene, light: Spectrum, axis: SpectralAxis, bins: int | None = None) -> tuple[float, ...]:
@@ -114,7 +117,7 @@ def _importance(smooth: np.ndarray, whole: np.ndarray) -> np.ndarray:
     return 0.5 * smooth[:, 1] / max(float(whole[1]), 1e-300) + 0.5 * smooth[:, 3] / max(float(whole[3]), 1e-300)
 
 
-def _parallel(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
+def _parallel(light, corners, _, to_gpu, unit, parts, common) -> list[Emission]:
     right, up, forward = light.axes().T
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     reach = float(np.linalg.norm(corners - middle, axis=1).max())
@@ -146,7 +149,7 @@ def _parallel(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
     return result
 
 
-def _diverging(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
+def _diverging(light, corners, along, to_gpu, unit, parts, common) -> list[Emission]:
     origin = to_gpu(np.array(light.position))
     direction = light.axes()[:, 2]
     is_area = light.has_outline
@@ -165,7 +168,7 @@ def _diverging(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
     result = []
     for offset in offsets:
         place = origin + offset
-        for forward, right, up, room in _charts(place, corners):
+        for forward, right, up, room in _charts(place, corners, along):
             limits = _cone(light, direction, forward, right, up)
             if limits is None:
                 continue
@@ -181,27 +184,40 @@ def _diverging(light, corners, to_gpu, unit, parts, common) -> list[Emission]:
     return result
 
 
-def _charts(place, corners):
-    """Gnomonic planes that hold all corners as seen from a place: one, or the sides of a cube."""
+def _charts(place, corners, along=None):
+    """Gnomonic planes that hold all corners as seen from a place: one, or the sides of a cube. Where the former would
+    be wide it is across `along`, if given, the normal of a facet: rays that meet that one are affine."""
     towards = 0.5 * (corners.min(axis=0) + corners.max(axis=0)) - place
     distance = float(np.linalg.norm(towards))
-    if distance > 1e-9:
-        forward = towards / distance
-        right = _unit(np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))]))
-        up = np.cross(forward, right)
+    ways = [] if distance <= 1e-9 else [(towards / distance, _WIDEST)]
+    if along is not None:
+        ways.append((along * np.sign(along @ towards), _WIDEST_ALONG))
+    for forward, widest in ways:
         depth = (corners - place) @ forward
         if depth.min() > 0.0:
+            right = _unit(np.cross(forward, np.eye(3)[np.argmin(np.abs(forward))]))
+            up = np.cross(forward, right)
             flat = np.column_stack([(corners - place) @ right, (corners - place) @ up]) / depth[:, None]
-            if np.abs(flat).max() <= _WIDEST:
+            if np.abs(flat).max() <= widest:
                 low, high = flat.min(axis=0), flat.max(axis=0)
                 half = 0.5 * float((high - low).max())
-                middle = 0.5 * (low + high)
-                return [(forward, right, up, np.array([*middle, 1.02 * half + 1e-9]))]
+                u, v = 0.5 * (low + high)
+                whole = float(u), float(v), 1.02 * half + 1e-9
+                rooms = _tiles(*whole) if widest > _WIDEST else [whole]
+                return [(forward, right, up, np.array(room)) for room in rooms]
     square = np.array([0.0, 0.0, 1.0])
     eye = np.eye(3)
     return [
         (sign * eye[k], eye[(k + 1) % 3], sign * eye[(k + 2) % 3], square) for k in range(3) for sign in (1.0, -1.0)
     ]
+
+
+def _tiles(u, v, half):
+    """A square of a wide gnomonic plane as squares (u, v, half side) that a light falls on nearly evenly."""
+    if half <= 0.5 * math.hypot(1.0, max(abs(u) - half, 0.0), max(abs(v) - half, 0.0)):
+        return [(u, v, half)]
+    part = 0.5 * half
+    return [tile for x in (u - part, u + part) for y in (v - part, v + part) for tile in _tiles(x, y, part)]
 
 
 def _line_of(normal, forward, right, up):
