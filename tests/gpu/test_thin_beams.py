@@ -67,9 +67,9 @@ def test_a_floor_in_two_parts_has_no_seam(gl, seam: float) -> None:
 
 
 def test_a_pane_under_a_lamp_is_lit_as_snell_and_fresnel_say() -> None:
-    """Straight below the lamp the density's slope is 0 and its second order everything: up to 1.8 times too bright without
-    that. Beyond 45° the lamp's light is that of other tiles: what two of them light is 1.6 times too bright. Pieces of
-    beams are off by 3 %."""
+    """Straight below the lamp the density's slope is 0 and its second order everything: up to 1.8 times too bright
+    without that. Beyond 45° the lamp's light is that of other tiles: what two of them light is 1.6 times too bright.
+    Pieces of beams are off by 3 %."""
     lamp = {"kind": "point", "position": [0, 0, 2], "intensity_cd": 1000}
     floor = {"name": "floor", "shape": "plane", "width": 6, "height": 6, "material": {"kind": "diffuse", "colour": 1}}
     pane = {"shape": "slab", "width": 20, "height": 20, "position": [0, 0, 1], "material": {"n_d": 1.5}}
