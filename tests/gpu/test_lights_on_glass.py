@@ -101,7 +101,9 @@ def test_the_tail_of_glass_without_dispersion_stays_in_the_bands_of_photons(gl, 
     monkeypatch.setattr(light_beams, "is_near_facets", lambda *_: False)
     scene = on_block(AreaLight("panel", WHITE, (0.0, 0.0, TOP + 1e-3), (0.0, 0.0, -1.0), radius=0.3))
     result = render(scene, replace(SETTINGS, photons=1024), context=gl)
-    assert np.isfinite(result.rgb).all() and result.stats.light.tally.carried_on > 0.0
+    tally = result.stats.light.tally
+    # What photons carried less what beams left: chance decides its sign.
+    assert np.isfinite(result.rgb).all() and 0.0 < abs(tally.carried_on) < 0.2 * tally.emitted
 
 
 def test_halves_of_a_beam_hold_no_more_than_the_whole(gl) -> None:
