@@ -17,10 +17,11 @@ from .nodes import (
     cut,
     first_place,
     forget_idle_lines,
+    go_through,
     last_place,
     lay_out,
 )
-from .rays import PARALLEL, PASS, REFLECT, REFRACT, at_x, follow, index_of, meet, total_line, transmitted
+from .rays import PARALLEL, PASS, REFLECT, REFRACT, at_x, follow, index_of, total_line, transmitted
 from .search import (
     LEAF_TAIL,
     SUM_ABSORBED,
@@ -196,9 +197,7 @@ def child(nodes, action, before, after, mask, diverges, facets, solids, tables, 
     row[4] = solids[inside].tint if inside >= 0 else -1
     least, most = 1e300, 0.0
     for a in range(first_place(beam), last_place(beam)):
-        share = meet(
-            facets, solids, tables, new.path, flight, new.x[a], new.position[a], new.direction[a], new.state[a]
-        )
+        share = go_through(new, a, flight, facets, solids, tables)
         new.weight[a] *= share
         least, most = min(least, share), max(most, share)
     new.flight, new.depth, new.mask = flight + 1, depth, mask

@@ -7,7 +7,7 @@ import numpy as np
 from .compiling import part
 from .current import CURRENT, DEAD, LAY, SPARE, distance_at, push_both
 from .nodes import copy, cut, exists_throughout, first_place, forget_idle_lines, last_place
-from .rays import PARALLEL, lengthening, moments
+from .rays import PARALLEL, moments
 from .search import (
     FRAGMENTS,
     LEAF_PIECE,
@@ -124,11 +124,8 @@ def fly(nodes, facets, solids, tables, source, obstacles, work):
     first = top = work.top
     current, spread, flight = nodes[CURRENT], work.spread, nodes[CURRENT].flight
     spread_of(current, spread)
-    work.growth[0] = work.growth[1] = 0.0  # those that leave a source are of any length (`starts`)
-    if flight > 0:
-        lengthening(source, current.centre[0], current.centre[1], work.growth)
     for a in range(first_place(current), last_place(current)):
-        moments(current.position[a], current.direction[a], work.growth, work.moment[a])
+        moments(current.position[a], current.direction[a], current.growth[a], work.moment[a])
     last = np.int64(current.path[flight - 1, 0]) if flight > 0 else -1
     owner, crossing, is_parallel = -1, False, source.kind == PARALLEL
     for o in range(work.objects):

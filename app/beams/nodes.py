@@ -12,7 +12,7 @@ import numpy as np
 from .clipping import clip_labelled
 from .compiling import part
 from .polarised import STATE, begin
-from .rays import edge_line, emit, emitted, lengthening, meet, moments, total_line
+from .rays import FACET, dot, edge_line, emit, emitted, lengthening, meet, moments, total_line
 
 CORNERS, LINES, LEVELS = 84, 96, 160
 """Room for corners of a polygon, half-planes of a beam, facets on its path."""
@@ -39,9 +39,11 @@ NODE = np.dtype(
         ("line", "f8", (LINES, 3, 3)),
         ("made", "i4", (LINES, 4)),
         ("lines", "i8"),
-        # Rays of the flight that is going on, at the three places, about q = `centre`; states of polarisation.
+        # Rays of the flight that is going on, at the three places, about q = `centre`, and relative changes of their
+        # lengths for `rays.moments`; states of polarisation.
         ("position", "f8", (3, 3, 3)),
         ("direction", "f8", (3, 3, 3)),
+        ("growth", "f8", (3, 2)),
         ("weight", "f8", 3),
         ("state", "f8", (3, STATE)),
         ("x", "f8", 3),
@@ -127,6 +129,7 @@ def copy_head(beam, other):
             for k in range(3):
                 other.position[a, c, k] = beam.position[a, c, k]
                 other.direction[a, c, k] = beam.direction[a, c, k]
+        other.growth[a, 0], other.growth[a, 1] = beam.growth[a, 0], beam.growth[a, 1]
         for c in range(STATE):
             other.state[a, c] = beam.state[a, c]
         other.weight[a] = beam.weight[a]
@@ -259,6 +262,20 @@ def cut(beam, line, sign, flight, facet, edge, way, work):
 
 
 @part
+def go_through(beam, a, k, facets, solids, tables):
+    """`rays.meet` for a beam's rays at place a. The components of their directions along the facet's normal stay as
+    they were: where rays of those lengths meet another plane is as good as affine behind glass, too."""
+    plane, direction, share = facets[beam.path[k, FACET]].plane, beam.direction[a], 1.0
+    for sign in (1.0, -1.0):
+        if sign < 0.0:
+            share = meet(facets, solids, tables, beam.path, k, beam.x[a], beam.position[a], direction, beam.state[a])
+        along = dot(plane, direction[0])
+        for c in range(2):
+            beam.growth[a, c] += sign * dot(plane, direction[c + 1]) / (along if abs(along) > 1e-12 else 1e-12)
+    return share
+
+
+@part
 def lay_lines(beam, a, flight, facets, tables, work, position, direction):
     """Lay a beam's half-planes of one flight anew at place a, for rays about its centre."""
     ready = False
@@ -267,7 +284,7 @@ def lay_lines(beam, a, flight, facets, tables, work, position, direction):
         if edge in (STATIC, HALF) or beam.made[ln, 0] != flight:
             continue
         if not ready:
-            moments(position, direction, work.growth, work.moment[3])
+            moments(position, direction, beam.growth[a], work.moment[3])
             ready = True
         line, way = beam.line[ln, a], beam.made[ln, 3]
         facet = facets[beam.made[ln, 1]]
@@ -286,9 +303,7 @@ def lay_lines(beam, a, flight, facets, tables, work, position, direction):
 def lay_out(beam, facets, solids, tables, source, work):
     """Make rays, half-planes and polygons of a beam anew at its places about its centre. Returns whether anything is
     left."""
-    room, n = work.room, beam.lines
-    left = False
-    lengthening(source, beam.centre[0], beam.centre[1], work.growth)
+    room, n, left = work.room, beam.lines, False
     for a in range(3):
         beam.corners[a] = beam.held[a] = 0
     for a in range(first_place(beam), last_place(beam)):
@@ -296,8 +311,9 @@ def lay_out(beam, facets, solids, tables, source, work):
         weight = 1.0
         for k in range(-1, beam.flight):
             if k >= 0:
-                weight *= meet(facets, solids, tables, beam.path, k, beam.x[a], position, direction, beam.state[a])
+                weight *= go_through(beam, a, k, facets, solids, tables)
             else:
+                lengthening(source, beam.centre[0], beam.centre[1], beam.growth[a])
                 emit(source, beam.centre[0], beam.centre[1], position, direction)
                 begin(source, direction, beam.state[a])
                 weight = emitted(source, beam.centre[0], beam.centre[1], direction)
@@ -308,8 +324,7 @@ def lay_out(beam, facets, solids, tables, source, work):
             corner[c, 0] = room[0] + (room[2] if c == 1 or c == 2 else -room[2])
             corner[c, 1] = room[1] + (room[2] if c > 1 else -room[2])
             side[c] = 0
-        beam.corners[a] = 4
-        m = beam.corners[a]
+        m = 4
         for ln in range(n):
             if heights(corner, m, beam.line[ln, a], 1.0, work.height) == 0:
                 continue

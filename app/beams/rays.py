@@ -86,7 +86,7 @@ def emit(source, u, v, position, direction):
 @part
 def lengthening(source, u, v, out):
     """Relative change per unit of q of the length of forward + u right + v up: rays whose directions grow so are
-    exactly affine where they leave the source, and behind panes nearly so; unit vectors are not."""
+    exactly affine where they leave the source; unit vectors are not."""
     out[0] = out[1] = 0.0
     if source.kind != PARALLEL:
         size = 0.0
@@ -95,8 +95,7 @@ def lengthening(source, u, v, out):
             size += towards * towards
             out[0] += towards * source.right[k]
             out[1] += towards * source.up[k]
-        out[0] /= size
-        out[1] /= size
+        out[0], out[1] = out[0] / size, out[1] / size
 
 
 @part
@@ -256,8 +255,8 @@ def follow(source, facets, solids, tables, path, flights, x, u, v, position, dir
 
 @part
 def moments(position, direction, growth, out):
-    """A bundle's rays as lines [Pluecker]: out[c] = direction, moment X x D; their derivatives for c > 0. `growth`:
-    `lengthening`, which changes no line."""
+    """A bundle's rays as lines [Pluecker]: out[c] = direction, moment X x D; their derivatives for c > 0. `growth` of
+    the directions changes no line, but how far from the chief ray side products with edges are linear."""
     for c in range(3):
         longer = growth[c - 1] if c > 0 else 0.0
         for k in range(3):

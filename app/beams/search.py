@@ -100,7 +100,6 @@ WORK = np.dtype(
         ("laid", "i8", 3),
         ("renamed", "i8", LINES),
         ("moment", "f8", (4, 3, 6)),
-        ("growth", "f8", 2),
         ("rays", "f8", (4, 3, 3)),
         ("state", "f8", STATE),
         ("map", "f8", (3, 3, 2)),

@@ -22,7 +22,8 @@ def starts(beam, facets, solids, tables, source, work):
         for a in range(3):
             for c in range(1, 3):
                 for k in range(3):
-                    beam.direction[a, c, k] += work.growth[c - 1] * beam.direction[a, 0, k]
+                    beam.direction[a, c, k] += beam.growth[a, c - 1] * beam.direction[a, 0, k]
+                beam.growth[a, c - 1] = 0.0
     beam.total = UNKNOWN
     return True
 

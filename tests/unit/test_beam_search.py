@@ -15,7 +15,7 @@ from spectrasplat.beams.facets import BeamScene, beam_scene
 from spectrasplat.beams.find import Emission, Search, search
 from spectrasplat.beams.leaves import Leaves
 from spectrasplat.beams.light_beams import LIGHT_PARTS, BeamFinder, parts_for
-from spectrasplat.beams.search import LEAF_PIECE, LEAF_RECEIVER, NARROWEST, SUM_ENTERED, SUM_ROULETTE
+from spectrasplat.beams.search import LEAF_PIECE, LEAF_RECEIVER, NARROWEST, SUM_ENTERED, SUM_NUMERIC, SUM_ROULETTE
 from spectrasplat.beams.sources import RIM, _places, emissions
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.spectral_tables import SpectralAxis
@@ -106,9 +106,32 @@ def test_light_that_is_caught_in_a_tinted_pane_ends_finite(tmp_path: Path, kind:
     beams = beam_scene(scene, meshes, {0: (np.zeros(3), np.eye(3)[:2])}, axis, 1.0)
     beams.facets["texel"] = 1e-3
     for emission in emissions(scene.lights[0], beams, lambda p: np.asarray(p, float), 1.0, axis, 1):
-        found = Leaves.joined(search(beams, [(emission, Search(1e-5, 1, 96, 1e-3))])[0][0]).leaf
+        found = Leaves.joined(search(beams, [(emission, Search(3e-7, 1, 96, 1e-3))])[0][0]).leaf
         assert len(found) and (found["density"][:, 1] < 1e-300).any()
         assert np.isfinite(found["slope"]).all() and np.isfinite(found["density"]).all()
+
+
+def test_all_light_in_a_pane_meets_one_of_its_sides() -> None:
+    """Half-planes of edges that light meets inside glass are straight to second order only for directions of the right
+    lengths: with those of the light outside, 0.2 % met no side, and floors had lines 1.7 times too bright."""
+    text = """
+[camera]
+position = [0, -6, 5]
+target = [0, 0, 0]
+[[lights]]
+kind = "point"
+position = [0.6, 0.3, 1.6]
+intensity_cd = 1000
+[[objects]]
+name = "pane"
+shape = "box"
+size = [2.4, 2.4, 0.1]
+position = [0, 0, 1]
+material = { n_d = 1.5 }
+"""
+    rig = Rig(scene_of(text), texel=0.016)
+    sums = sum(rig.find(emission, 1e-5)[1] for emission in rig.emissions())
+    assert 0.0 <= sums[SUM_NUMERIC] < 3e-4 * sums[SUM_ENTERED]
 
 
 def test_threads_do_not_matter(stone: tuple[BeamScene, Emission]) -> None:
