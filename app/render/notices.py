@@ -131,10 +131,15 @@ def _window_pixels(light: LightPass, receiver: int, window: Window | PictureWind
 
 
 def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, rgb: np.ndarray) -> list[str]:
-    """Whether a picture (H, W, 3) with caustics in it holds what the maps of flat receivers put into its pixels, where
-    nothing may be in the way."""
+    """Whether a picture (H, W, 3) with caustics in it is black, or lacks what the maps of flat receivers put into its
+    pixels, where nothing may be in the way."""
     if settings.bins or settings.layer not in ("beauty", "caustic") or not np.isfinite(rgb).all():
         return []
+    if settings.layer == "caustic" and light.stats.tally.ended["deposited"] > 0.0 and not rgb.any():
+        return [
+            "the picture is black: the camera sees what caustics fall on through glass or in mirrors, or not at all; "
+            "--layer beauty shows what it sees"
+        ]
     expected, held = 0.0, 0.0
     for receiver in light.survey.lit_receivers:
         if light.layout.windows[receiver] and faces_camera(camera, light.buffers, receiver):

@@ -65,6 +65,8 @@ def test_a_picture_that_lacks_what_its_maps_hold_is_told(gl) -> None:
         assert picture_notices(light, scene.camera, SETTINGS, right) == []
         (told,) = picture_notices(light, scene.camera, SETTINGS, 0.3 * right)
         assert "30 %" in told
+        (told,) = picture_notices(light, scene.camera, SETTINGS, 0.0 * right)
+        assert "black" in told
         assert light_notices(light) == []
 
 
