@@ -136,10 +136,8 @@ def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, 
     if settings.bins or settings.layer not in ("beauty", "caustic") or not np.isfinite(rgb).all():
         return []
     if settings.layer == "caustic" and light.stats.tally.ended["deposited"] > 0.0 and not rgb.any():
-        return [
-            "the picture is black: the camera sees what caustics fall on through glass or in mirrors, or not at all; "
-            "--layer beauty shows what it sees"
-        ]
+        seen = "the camera sees what caustics fall on through glass or in mirrors, or not at all"
+        return [f"the picture is black: {seen}; --layer beauty shows what it sees"]
     expected, held = 0.0, 0.0
     for receiver in light.survey.lit_receivers:
         if light.layout.windows[receiver] and faces_camera(camera, light.buffers, receiver):
