@@ -137,7 +137,7 @@ def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, 
         return []
     if settings.layer == "caustic" and light.stats.tally.ended["deposited"] > 0.0 and not rgb.any():
         seen = "the camera sees what caustics fall on through glass or in mirrors, or not at all"
-        return [f"the picture is black: {seen}; --layer beauty shows what it sees"]
+        return [f"the picture is black: {seen}; the layer 'beauty' shows what it sees"]
     expected, held = 0.0, 0.0
     for receiver in light.survey.lit_receivers:
         if light.layout.windows[receiver] and faces_camera(camera, light.buffers, receiver):
