@@ -25,6 +25,7 @@ class KeptFiles:
     """Those of one folder; the least recently used ones are forgotten."""
 
     folder: str
+    """In the user's cache folder, or a whole path."""
     largest: int
     """Bytes of one, packed and unpacked."""
     most_files: int | None = None
@@ -60,5 +61,5 @@ class KeptFiles:
 
     def _path(self, key: str) -> Path:
         folder = paths.cache_dir() / self.folder
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(parents=True, exist_ok=True)
         return folder / (key + _SUFFIX)

@@ -1,7 +1,8 @@
 """The functions of this folder as machine code.
 
-numba compiles them, which takes it most of a minute for all. What it made is kept on the disk and from then on loaded
-by llvmlite alone: numba itself takes longer to start (half a second) than most searches for beams.
+numba compiles them, which takes it most of a minute for all. What it made is kept in the user's cache folder, by the
+content of its source, and from then on loaded by llvmlite alone: numba itself takes longer to start (half a second)
+than most searches for beams.
 """
 
 from __future__ import annotations
@@ -10,7 +11,6 @@ import ctypes
 import json
 import os
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
 from importlib.util import find_spec
@@ -20,17 +20,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..base.atomic import atomic_output
 from ..base.compiling import version_of
-from ..base.errors import UserError
-from ..base.files import read_bytes
-from ..base.paths import cache_dir
+from ..base.kept_files import KeptFiles
 
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "_nrt": False}
 _OPTIONS |= {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 """References are not counted, so nothing may be allocated inside: scratch comes from the caller (`search.WORK`)."""
-_MOST_BYTES = 1 << 26
-"""Bytes of a file, at most."""
+_KEPT = KeptFiles(os.path.join(os.environ.get("NUMBA_CACHE_DIR", ""), "compiled"), 1 << 26, most_files=256)
+"""Next to what numba keeps (`base.compiled_place`)."""
 _RESULTS: dict[str, Any] = {"none": ctypes.c_void_p, "bool": ctypes.c_bool, "float64": ctypes.c_double}
 _COMPILERS = "numba", "llvmlite"
 _KNOWN = ("0.68.",)
@@ -82,31 +79,26 @@ class Kernel:
         return call(*arguments)
 
     def _call_for(self, kinds: tuple[Kind, ...]) -> Callable:
-        """From the disk where it was compiled before; a folder that cannot be written only costs time."""
-        source = Path(self._function.__code__.co_filename)
-        folder = source.parent / "__pycache__"
-        if not os.access(folder if folder.is_dir() else source.parent, os.W_OK):
-            folder = cache_dir() / "beams"
-        path = folder / f"{source.stem}.{self._function.__name__}-{version_of([repr(kinds).encode()])}.machine"
-        kept = _MachineCode.read(path)
-        if kept is None:
-            import numba
+        """From the disk where it was compiled before."""
+        function = self._function
+        version = version_of([_version().encode(), repr(kinds).encode()])
+        key = f"{Path(function.__code__.co_filename).stem}.{function.__name__}-{version}"
+        kept = _KEPT.load(key)
+        if kept is not None:
+            return _Native(_MachineCode.unpacked(kept), kinds)
+        import numba
 
-            if not numba.__version__.startswith(_KNOWN):
-                return numba.njit(error_model="numpy", nogil=True)(self._function)
-            kept = _compiled(self._function, kinds)
-            with suppress(OSError, UserError):
-                folder.mkdir(exist_ok=True)
-                kept.write(path)
-        return _Native(kept, kinds)
+        if not numba.__version__.startswith(_KNOWN):
+            return numba.njit(error_model="numpy", nogil=True)(function)
+        machine = _compiled(function, kinds)
+        _KEPT.save(key, machine.packed())
+        return _Native(machine, kinds)
 
 
 @dataclass(frozen=True)
 class _MachineCode:
     """One function for arguments of some kinds."""
 
-    version: str
-    """`_version` when it was compiled."""
     triple: str
     """LLVM's name of the platform."""
     symbol: str
@@ -119,20 +111,15 @@ class _MachineCode:
     """An object file."""
 
     @staticmethod
-    def read(path: Path) -> _MachineCode | None:
-        """What `write` wrote; None where there is nothing of this version."""
-        try:
-            head, _, code = read_bytes(path, _MOST_BYTES).partition(b"\n")
-            kept = _MachineCode(**json.loads(head), code=code)
-        except (OSError, UserError, ValueError, TypeError):
-            return None
-        return kept if kept.version == _version() else None
+    def unpacked(content: bytes) -> _MachineCode:
+        """What `packed` made."""
+        head, _, code = content.partition(b"\n")
+        return _MachineCode(**json.loads(head), code=code)
 
-    def write(self, path: Path) -> None:
-        """Keep it. Raises `OSError` and `UserError`."""
+    def packed(self) -> bytes:
+        """A line that describes it, then the object file."""
         head = {name: value for name, value in vars(self).items() if name != "code"}
-        with atomic_output(path, lasting=False) as temporary:
-            temporary.write_bytes(json.dumps(head).encode() + b"\n" + self.code)
+        return json.dumps(head).encode() + b"\n" + self.code
 
 
 class _Native:
@@ -192,7 +179,6 @@ def _compiled(function: Callable, kinds: tuple[Kind, ...]) -> _MachineCode:
     symbol = dispatcher.overloads[arguments].fndesc.llvm_func_name
     module = binding.parse_assembly(dispatcher.inspect_llvm(arguments))
     return _MachineCode(
-        _version(),
         module.triple,
         symbol,
         str(dispatcher.overloads[arguments].signature.return_type),
@@ -215,11 +201,12 @@ def _version() -> str:
     """Changes with the functions, with what compiles them and with the processor."""
     from llvmlite import binding
 
-    compilers = [str(spec and spec.origin and os.stat(spec.origin).st_mtime_ns) for spec in map(find_spec, _COMPILERS)]
-    machine = binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
     texts = [path.read_bytes() for path in sorted(Path(__file__).parent.glob("*.py"))]
     sources = [text for text in texts if b"compiling import" in text]  # this file too
-    return version_of([*sources, *(text.encode() for text in (*compilers, *machine))])
+    packages = [Path(str(spec.origin)).parent for spec in map(find_spec, _COMPILERS) if spec]
+    compilers = [(package / "_version.py").read_bytes() for package in packages]
+    machine = binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten()
+    return version_of([*sources, *compilers, *(text.encode() for text in machine)])
 
 
 def jit(function: Callable) -> Kernel:
