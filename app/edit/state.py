@@ -20,6 +20,8 @@ Tool = Literal["select", "move", "rotate", "scale", "brush", "pull", "measure"]
 CompareMode = Literal["off", "hold", "wipe", "error"]
 Theme = Literal["dark", "light"]
 ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
+SOLO_START_NM = 550.0
+"""Where single-wavelength display starts: green, which every white light has."""
 
 
 @dataclass(frozen=True)

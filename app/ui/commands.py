@@ -12,7 +12,7 @@ from functools import partial, reduce
 from typing import Any
 
 from ..edit import requests, selecting
-from ..edit.state import Panels, Selection, State, Tool
+from ..edit.state import SOLO_START_NM, Panels, Selection, State, Tool
 from . import layout
 from .panels import dialogs
 from .view_model import ViewModel
@@ -20,8 +20,6 @@ from .view_model import ViewModel
 Act = Callable[[State, ViewModel], State]
 Test = Callable[[State, ViewModel], bool]
 
-SOLO_START_NM = 550.0
-"""Where single-wavelength display starts: green, which every white light has."""
 _NOT_HIDDEN = ("start_page", "shortcuts", "about")
 """Windows that "Hide panels" leaves alone."""
 _hidden: list[Panels] = []

@@ -11,17 +11,15 @@ from dataclasses import dataclass, replace
 from imgui_bundle import imgui
 
 from ..edit.state import Panels, State
-from . import item_rects, layout, shortcuts, theme
+from . import help_list, item_rects, layout, menu, shortcuts, theme
 from .layout import Place
 from .panels import (
     dialogs,
     gem_panel,
-    help_list,
     history_panel,
     inspector,
     lens_panel,
     lesson_panel,
-    menu,
     messages,
     numbers,
     opened_card,

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 from ...edit import edits
 from ...edit.camera_controls import focus_at
-from ...edit.state import Display, State, ToneCurve
+from ...edit.state import SOLO_START_NM, Display, State, ToneCurve
 from ...model.contacts import world_bounds
 from ...model.scene_render import MAX_GLARE
-from ..commands import SOLO_START_NM
 from ..view_model import ViewModel
 from . import false_colour, spectrum_strip, widgets
 from .camera_rows import draw_camera_rows

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 from imgui_bundle import imgui
 
-from ...edit.state import Panels, State, Theme
-from .. import commands, item_rects, layout, theme
-from ..commands import Command
-from ..view_model import ViewModel
-from . import dialogs, lesson_panel, outliner, widgets
-from .methods import MENU_METHODS, METHOD_TIPS
+from ..edit.state import Panels, State, Theme
+from . import commands, item_rects, layout, theme
+from .commands import Command
+from .panels import dialogs, lesson_panel, outliner, widgets
+from .panels.methods import MENU_METHODS, METHOD_TIPS
+from .view_model import ViewModel
 
 _SCALES = (0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 1.75, 2.0)
 

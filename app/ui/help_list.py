@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from ...base.paths import assets_dir
-from ...base.version import __version__
-from ...edit.state import State
-from .. import item_rects, shortcuts, theme
-from ..view_model import ViewModel
-from . import widgets
+from ..base.paths import assets_dir
+from ..base.version import __version__
+from ..edit.state import State
+from . import item_rects, shortcuts, theme
+from .panels import widgets
+from .view_model import ViewModel
 
 _search = {"text": ""}
 """What is typed in the search field: memory of the interface."""
