@@ -37,6 +37,8 @@ DATA_BYTES = 2 << 30
 """Meshes, pictures, glTF buffers."""
 
 _everything = ContextVar("everything", default=False)
+_were_read: set[tuple[int, int]] = set()
+"""Devices and numbers of the files that this process has opened."""
 
 
 class _Permission:
@@ -119,6 +121,15 @@ def with_part(name: str | os.PathLike[str]) -> tuple[Path, str]:
     return Path(text), ""
 
 
+def was_read(path: str | os.PathLike[str]) -> bool:
+    """Whether this process has read that file, by whatever name."""
+    try:
+        state = os.stat(path)
+    except (OSError, ValueError):
+        return False
+    return (state.st_dev, state.st_ino) in _were_read
+
+
 def check_regular(path: str | os.PathLike[str], limit: int) -> None:
     """Raise as `read_bytes` would: for libraries that open a file by its name."""
     _opened(path, limit).close()
@@ -165,6 +176,7 @@ def _opened(path: str | os.PathLike[str], limit: int) -> io.BufferedReader:
         raise OSError(errno.EINVAL, "no file can have this name", name) from error
     state = os.fstat(descriptor)
     if stat.S_ISREG(state.st_mode) and state.st_size <= limit:
+        _were_read.add((state.st_dev, state.st_ino))
         return os.fdopen(descriptor, "rb")
     os.close(descriptor)
     if stat.S_ISREG(state.st_mode):

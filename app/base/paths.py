@@ -11,6 +11,8 @@ import platformdirs
 MESH_SUFFIXES = (".ply", ".obj", ".stl", ".asc")
 SCENE_SUFFIXES = (".toml", ".glb", ".gltf", *MESH_SUFFIXES, ".zmx", ".csv")
 CONFIG_ENVIRONMENT = "SPECTRASPLAT_CONFIG"
+_MESA_INDEX_BYTES = 8 + 65536 * 20
+"""A size and the keys, see Mesa's src/util/disk_cache_os.c."""
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
@@ -65,3 +67,20 @@ def cache_dir() -> Path:
     path = Path(platformdirs.user_cache_dir("spectrasplat", appauthor=False))
     path.mkdir(parents=True, exist_ok=True)
     return path
+
+
+def reserve_driver_cache() -> None:
+    """Before OpenGL starts: room on the disk for the index of Mesa's shader cache, which Mesa writes as if it were
+    memory, so that a full disk would end the process there (SIGBUS). Where there is no room Mesa keeps no cache."""
+    if not hasattr(os, "posix_fallocate"):
+        return
+    folder = Path(os.environ.get("MESA_SHADER_CACHE_DIR") or platformdirs.user_cache_dir()) / "mesa_shader_cache"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        index = os.open(folder / "index", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        try:
+            os.posix_fallocate(index, 0, _MESA_INDEX_BYTES)
+        finally:
+            os.close(index)
+    except OSError:
+        os.environ["MESA_SHADER_CACHE_DISABLE"] = "true"

@@ -26,10 +26,10 @@ T = TypeVar("T")
 def bake_texture(options: Bake) -> int:
     """Bake to a file; returns the exit code. Raises `UserError`."""
     from ..base.image_io import check_suffix
-    from ..render.bake import placement_path, write_map
+    from ..render.bake import write_map, written_with
 
     check_suffix(options.output)
-    outputs = [options.output, placement_path(options.output)]
+    outputs = written_with(options.output)
     return _baked(
         options,
         outputs,

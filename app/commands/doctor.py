@@ -26,6 +26,8 @@ _NATIVE_MODULES = ("numpy", "moderngl", "imgui_bundle", "glfw", "numba", "OpenEX
 """Modules with compiled parts, which can be installed and still not load; imgui_bundle must precede glfw."""
 _WINDOW_MODULES = ("imgui_bundle", "glfw")
 """Rendering to files does without them."""
+_CACHE_BYTES = 16 << 20
+"""What the programs of a few scenes take."""
 _MORE_THAN_PROMISED = dict.fromkeys(
     ("vertex_storage_blocks", "storage_bindings"),
     "update the graphics driver or use another GPU: OpenGL 4.3 promises fewer, but splats are drawn by vertex shaders "
@@ -203,10 +205,10 @@ def _display() -> Check:
 def _cache() -> Check:
     try:
         folder = cache_dir()
-        with tempfile.TemporaryFile(dir=folder):
-            pass
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(_CACHE_BYTES))
     except OSError as error:
-        remedy = "make the folder writable, or set XDG_CACHE_HOME to one that is"
+        remedy = "make room or the folder writable, or set XDG_CACHE_HOME to one that is; else all is compiled anew"
         return Check("cache folder", str(error), "optional", remedy)
     return Check("cache folder", f"{folder} is writable", "ok")
 

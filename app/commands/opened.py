@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from ..base import files
 from ..base.errors import UserError
 from ..base.memory import check_picture_memory
 from ..model.settings import RenderSettings
@@ -28,6 +29,9 @@ def open_scene(values: OpensScene) -> Scene:
         from ..edit.opening import open_scene as opened
 
         scene = opened(path, opening)
+    output = getattr(values, "output", None)
+    if output is not None and files.was_read(output):
+        raise UserError(f"cannot write {output}: it is the scene itself, or a file that it needs; choose another name")
     camera, defaults = given_for("camera", values), given_for("render", values)
     if camera:
         scene = replace(scene, camera=replace(scene.camera, **camera))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import time
 from pathlib import Path
@@ -98,9 +97,6 @@ def check_output(options: Render) -> Path:
     from ..base.atomic import check_writable
 
     scene_file = find_scene(options.scene)
-    # os.path.exists, unlike Path.exists, is silent about a name that is too long.
-    if os.path.exists(options.output) and options.output.samefile(scene_file):
-        raise UserError(f"cannot write {options.output}: it is the scene itself; choose another name")
     check_writable(options.output)
     return scene_file
 

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Literal, Self
 
 from ..base.errors import DeviceError, OwnCallError, UserError, own_fault, suggestion
+from ..base.paths import reserve_driver_cache
 from .better_device import advice
 from .device_traits import DeviceTraits, is_software_renderer
 from .limits import Limits
@@ -122,6 +123,7 @@ def create_context(backend: Backend | None = None) -> Context:
             "so run SpectraSplat on Linux (a virtual machine or a container will do)"
         )
     chosen = backend or _from_environment()
+    reserve_driver_cache()
     if chosen == "osmesa":
         return _create_osmesa()
     try:

@@ -12,8 +12,10 @@ from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 
+from ..base import files
 from ..base.atomic import atomic_outputs
 from ..base.errors import UserError, suggestion
 from ..base.image_io import check_finite, check_suffix, write_into
@@ -35,6 +37,23 @@ UNITS = "irradiance, lm/unit² (linear Rec.709, white counts in full), without t
 def placement_path(path: Path) -> Path:
     """The `.json` that belongs to a baked map."""
     return path.with_suffix(".json")
+
+
+def written_with(path: Path, *others: Path) -> list[Path]:
+    """`path` and the files that are written with it. Raises `UserError` where one of those is there and was not
+    written with a `path` of this name, as the `.json` says: nobody was asked whether it may go."""
+    beside = [*others, placement_path(path)]
+    there = [each.name for each in beside if files.is_file(each)]
+    try:
+        numbers = msgspec.json.decode(files.read_bytes(beside[-1], files.TABLE_BYTES))
+    except (OSError, msgspec.DecodeError):
+        numbers = None
+    if there and not (isinstance(numbers, dict) and numbers.get("file") == path.name):
+        raise UserError(
+            f"cannot write {path}: that would replace {' and '.join(there)} next to it, which it "
+            "did not write; choose another name"
+        )
+    return [path, *beside]
 
 
 def check_receiver(scene: Scene, name: str) -> None:
@@ -123,7 +142,7 @@ def write_map(baked: Drawn, scene: Scene, receiver: str, path: Path) -> None:
     numbers = {**baked.placement, "receiver": receiver, "scene": scene.name, "file": path.name, "units": UNITS}
     if path.suffix.lower() == ".png":
         numbers["exposure_ev"] = auto_exposure(rgb)
-    with atomic_outputs(path, placement_path(path)) as (picture, note):
+    with atomic_outputs(*written_with(path)) as (picture, note):
         write_into(picture, rgb, antialias=False)  # a texture: a pixel stays what it is
         note.write_text(json.dumps(numbers, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 

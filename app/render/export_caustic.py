@@ -16,7 +16,7 @@ from ..base.image_io import check_finite, save_codes, write_into
 from ..base.tone_map import srgb_oetf
 from ..model.io.lit_mesh import check_usd, texture_path, write_lit_gltf, write_lit_usd
 from ..model.scene import Scene
-from .bake import placement_path
+from .bake import written_with
 from .cookie import cookie
 from .lit_receiver import lit_receiver, up_of
 
@@ -44,8 +44,8 @@ def check_export(path: Path, plane: bool = False, source: Sequence[float] | None
         raise UserError(f"--source does not go with {path.name}: it belongs to a spot's cookie, .png or .exr")
     if suffix in USD_SUFFIXES:
         check_usd()
-        return [path, texture_path(path), placement_path(path)]
-    return [path] if suffix in PAGE_SUFFIXES else [path, placement_path(path)]
+        return written_with(path, texture_path(path))
+    return [path] if suffix in PAGE_SUFFIXES else written_with(path)
 
 
 def write_export(
@@ -97,7 +97,7 @@ def _write_cookie(
     made = cookie(scene, receiver, rgb, placement, max(rgb.shape[:2]), source)
     is_png = path.suffix.lower() == ".png"
     numbers |= made.numbers() | {"encoding": "8-bit sRGB" if is_png else "linear Rec.709", "white_is": "intensity_cd"}
-    with atomic_outputs(path, placement_path(path)) as (picture, note):
+    with atomic_outputs(*written_with(path)) as (picture, note):
         if is_png:
             save_codes(picture, np.rint(255.0 * srgb_oetf(np.clip(made.rgb, 0.0, 1.0))).astype(np.uint8))
         else:

@@ -230,8 +230,8 @@ def _bake(
 
     check_suffix(request.path)
     bake.check_receiver(stage.scene, request.receiver)
-    check_writable(request.path)
-    check_writable(bake.placement_path(request.path))
+    for path in bake.written_with(request.path):
+        check_writable(path)
     return bake.bake(context, stage, settings, request.receiver, request.path, notices)
 
 

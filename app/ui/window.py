@@ -20,6 +20,7 @@ from imgui_bundle import imgui  # before glfw: it brings the GLFW that both then
 import glfw  # isort: skip
 
 from ..base.errors import UserError
+from ..base.paths import reserve_driver_cache
 from ..edit.preferences import WindowPlace
 from ..gpu.context import GL_VERSION, GL_VERSION_CODE, Context
 from ..gpu.context_thread import ContextThread
@@ -382,6 +383,7 @@ def _create(place: WindowPlace, visible: bool) -> Any:
     glfw.window_hint(glfw.MAXIMIZED, place.maximised)
     glfw.window_hint(glfw.DEPTH_BITS, 0)
     glfw.window_hint(glfw.STENCIL_BITS, 0)
+    reserve_driver_cache()
     handle = glfw.create_window(*place.size, "SpectraSplat", None, None)
     if not handle:
         glfw.terminate()

@@ -4,7 +4,10 @@ Every reader has its own table of refusals; here is one of each kind, all the wa
 
 from __future__ import annotations
 
+import io
 from typing import NamedTuple
+
+import numpy as np
 
 VIEW = '[camera]\nposition = [0, -5, 2]\n[[lights]]\nkind = "point"\nposition = [0, 0, 4]\n'
 FLOOR = '[[objects]]\nshape = "plane"\nmaterial = "diffuse"\nposition = [0, 0, -1.5]\n'
@@ -31,6 +34,11 @@ def ply(body: str = CORNERS + FACES, vertices: int = 4, faces: int = 4, normals:
     header += "".join(f"property float {column}\n" for column in columns.split())
     header += f"element face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
     return (header + body).encode()
+
+
+def npy(values: np.ndarray) -> bytes:
+    np.save(stream := io.BytesIO(), values)
+    return stream.getvalue()
 
 
 class Case(NamedTuple):
@@ -167,6 +175,12 @@ OUTPUTS = {
     "read-only place": Case(PLAIN, said("/proc/x.png", "no permission"), output="/proc/x.png"),
     "long name": Case(PLAIN, said("too long", "shorter"), output="x" * 300 + ".png"),
     "pipe": Case(PLAIN, said("pipe.png", "ordinary file"), output="pipe.png"),
+    "picture that it shows": Case(
+        PLAIN + '[environment]\nkind = "map"\nfile = "sky.npy"\n',
+        said("write sky.npy", "a file that it needs", "another name"),
+        files={"sky.npy": npy(np.full((2, 4, 3), 0.5, np.float32))},
+        output="sky.npy",
+    ),
     "scene itself": Case(ply(), said("bare.ply", ".png"), name="bare.ply", output="bare.ply"),
 }
 CASES = {

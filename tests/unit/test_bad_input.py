@@ -20,6 +20,9 @@ from typing import Any
 import numpy as np
 import pytest
 from spectrasplat.__main__ import main
+from spectrasplat.base.errors import UserError
+from spectrasplat.base.paths import reserve_driver_cache
+from spectrasplat.render.bake import written_with
 
 from tests.unit.bad_inputs import CASES, CORNERS, FACES, FLOOR, MESH, PLAIN, VIEW, Case, glass, mesh_case, ply
 
@@ -71,6 +74,39 @@ def test_one_sentence_and_nothing_touched(
     assert captured.err.count("\n") == 1 and captured.err.startswith("spectrasplat: ")
     assert [part for part in case.told if part not in captured.err] == []
     assert contents(tmp_path) == before
+
+
+def test_what_is_written_with_another_file_replaces_its_own_predecessor_only(tmp_path: Path) -> None:
+    path = tmp_path / "table.exr"
+    place = path.with_suffix(".json")
+    assert written_with(path) == [path, place]
+    path.write_bytes(OLD)
+    place.write_text('{"file": "table.exr"}')
+    assert written_with(path) == [path, place]
+    with pytest.raises(UserError, match=r"table\.glb: .* replace table\.json next to it, .* choose another"):
+        written_with(path.with_suffix(".glb"))
+    place.write_text("[1, 2")
+    with pytest.raises(UserError, match="table.json"):
+        written_with(path)
+    place.unlink()
+    with pytest.raises(UserError, match="replace table.exr next"):
+        written_with(path.with_suffix(".usda"), path)
+
+
+def test_mesas_cache_has_room_for_its_index_or_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mesa writes it as memory: pages that a full disk cannot hold end the process (seen on a tmpfs of 64 KiB)."""
+    monkeypatch.setattr(os, "environ", {"XDG_CACHE_HOME": str(tmp_path)})
+    reserve_driver_cache()
+    index = tmp_path / "mesa_shader_cache" / "index"
+    assert index.stat().st_blocks * 512 >= 65536 * 20 and "MESA_SHADER_CACHE_DISABLE" not in os.environ
+    index.unlink()
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4096, limits[1]))
+    try:
+        reserve_driver_cache()
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert os.environ["MESA_SHADER_CACHE_DISABLE"] == "true"
 
 
 # -- what is rendered all the same, with a warning -----------------------------------------
