@@ -15,12 +15,11 @@ defined) is kept as it is, and so is then everything else.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from .glsl_conditionals import DEFINE, Line, Unit, directive_of, macros_of, resolve_conditionals, value_of
-from .glsl_folding import folded, places_of
-from .glsl_unrolling import unrolled
+from .glsl_folding import end_of_statement, folded, places_of
 
 _UNROLLS_NOTHING = "optionNV(unroll none)"
 _WORD = re.compile(r"[A-Za-z_]\w*")
@@ -33,6 +32,9 @@ _MEMBER = re.compile(r"\b(\w+)\s*(?:\[[^\]]*\])*\s*[;,]")
 _MEMBER_NAME = re.compile(r"\b\w+(?=\s*(?:\[[^\]]*\])*\s*[;,])")
 _BRACKETED = re.compile(r"\([^()]*\)|\{[^{}]*\}|\[[^\[\]]*\]")
 _MADE = re.compile(r"\b([A-Z]\w*)\s*(?:\[\w*\])?\(")
+MOST_ROUNDS = 6
+"""Loops of more rounds stay loops."""
+_LOOP = re.compile(r"\bfor \(int (\w+) = 0; \1 < (\w+); \+\+\1\)\s*")
 
 
 def stripped(lines: Sequence[Line], switches: frozenset[str] = frozenset()) -> list[Line]:
@@ -240,3 +242,25 @@ def _struct_parts(name: str, indices: tuple[int, ...], units: Sequence[Unit], *,
         itself,
         *(_Definition(names, (i,), _MEMBER_NAME.sub("", lines[i]), structs=needed) for i, names in members.items()),
     ]
+
+
+def unrolled(text: str, count_of: Callable[[str], int | None]) -> str:
+    """`text`, a function, with loops of few rounds (over a path's columns, a picture's targets) written out, in as many
+    lines: arrays that only known numbers index are registers, where a loop's counter would put them into memory.
+    `count_of`: the value of a number or macro, where it is known."""
+    at = 0
+    while loop := _LOOP.search(text, at):
+        end = end_of_statement(text, loop.end())
+        name, rounds, body = loop.group(1), count_of(loop.group(2)), text[loop.end() : end]
+        if rounds is None or rounds > MOST_ROUNDS or re.search(rf"\b(?:break|continue|int {name})\b", body):
+            at = loop.end()
+            continue
+        use = re.compile(rf"(?<![.\w]){name}\b")
+        copies = [use.sub(str(index), body) for index in range(rounds)]
+        # One copy keeps its lines, for the compiler's messages.
+        written = " ".join((*(" ".join(copy.split()) for copy in copies[1:]), "}"))
+        lines = "\n" * (0 if copies else body.count("\n"))
+        head = "\n" * text[loop.start() : loop.end()].count("\n")
+        text = text[: loop.start()] + head + "{ " + "".join(copies[:1]) + lines + " " + written + text[end:]
+        at = loop.start()
+    return text

@@ -31,11 +31,10 @@ from ..model.tint_bands import tint_curves
 from ..model.tint_levels import TintLevels, tint_levels
 from . import bindings, shader
 from .gpu_space import GpuSpace
-from .grating_records import grating_tables, grating_texels
 from .records import NONE
 from .scene_geometry import SceneGeometry
 from .scene_motion import MovingTriangles, ObjectPlaces, WorldMeshes
-from .scene_records import CRYSTAL, OBJECT, PIECE, WEDGE
+from .scene_records import CRYSTAL, OBJECT, PIECE, WEDGE, grating_tables, grating_texels
 from .scene_texels import SceneTexels, spectra_texture
 from .spectral_groups import SAMPLES, Groups, index_slope, samples_of
 from .texture_store import textured_objects

@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 
 from ..base.kept_files import KeptFiles
-from . import dead_code, glsl_conditionals, glsl_folding, glsl_unrolling
+from . import dead_code, glsl_conditionals, glsl_folding
 from .glsl_conditionals import Line
 
 KEPT = KeptFiles("shaders", 1 << 22, most_files=4096)
@@ -34,7 +34,7 @@ def stripped(lines: Sequence[Line], switches: frozenset[str]) -> list[Line]:
 def _version() -> bytes:
     """Changes with the code that strips."""
     digest = hashlib.blake2b(digest_size=16)
-    for module in (dead_code, glsl_conditionals, glsl_folding, glsl_unrolling):
+    for module in (dead_code, glsl_conditionals, glsl_folding):
         digest.update(Path(module.__file__ or "").read_bytes())
     return digest.digest()
 

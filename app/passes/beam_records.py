@@ -13,7 +13,7 @@ import numpy as np
 from ..beams.polygons import WIDE, BeamPolygons
 from ..gpu.beam_tables import CurveParts
 from ..gpu.schema import Field, Struct
-from .texel_map import TexelMap
+from .plane_frame import TexelMap
 
 BEAM = Struct(
     "BeamRecord",

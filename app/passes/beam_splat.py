@@ -22,7 +22,7 @@ from ..gpu.framebuffers import adding
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
 from .beam_records import BEAM, PackedBeams, hull_areas, hull_boxes, levels, packed, texel_hulls
-from .texel_map import TexelMap
+from .plane_frame import TexelMap
 
 if TYPE_CHECKING:
     import moderngl

@@ -32,11 +32,15 @@ from .haze import Haze
 from .listed_pixels import ListedPixels
 from .picture_channels import Channels
 from .picture_sums import PictureSums
-from .pixel_lattice import LOOKS, cells_of, is_in_strips, looks_lattice, pixel_lattice
 from .sample_spread import (
+    LOOKS,
     PRIMARY_SAMPLES,
     SURVEY_KEPT,
+    cells_of,
+    is_in_strips,
+    looks_lattice,
     looks_of,
+    pixel_lattice,
     spread_alone,
     spread_pilot,
     spread_samples,

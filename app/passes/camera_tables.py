@@ -18,10 +18,10 @@ import numpy as np
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.device_traits import DeviceTraits
-from ..gpu.grating_records import grating_tables
 from ..gpu.map_channels import MapChannels
 from ..gpu.running_sums import BIND_KNOTS, KNOTS, RunningSums, SumRow
 from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.scene_records import grating_tables
 from ..gpu.scene_texels import spectra_texels
 from ..gpu.spectral_groups import SAMPLES, index_slope, samples_of
 from ..model.film_stacks import film_parts, film_tables

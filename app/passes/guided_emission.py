@@ -14,7 +14,7 @@ import numpy as np
 
 from ..gpu.records import MASK_SIZE
 from .emission_domain import EmissionDomain
-from .lattice_order import GOLDEN
+from .lattice_slice import GOLDEN
 from .pilot import Pilot
 
 _REACH = 2

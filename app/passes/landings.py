@@ -1,18 +1,22 @@
-"""Where photons landed: what maps are fitted to."""
+"""Where photons landed: what maps are fitted to. What lands on one side of a receiver does not show on the other."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..gpu import shader
+from ..model.scene_camera import camera_frame
 
 if TYPE_CHECKING:
     import moderngl
 
+    from ..gpu.scene_buffers import SceneBuffers
     from ..gpu.schema import Struct
+    from ..model.scene import Camera
 
 CHOSEN = 512
 """Photons that say where all of them land."""
@@ -72,3 +76,29 @@ class ChosenLandings:
     def release(self) -> None:
         """Free everything."""
         shader.release(self._program, self._landed, self._count)
+
+
+def is_back(receiver: int) -> bool:
+    """Whether number `receiver` is a back."""
+    return receiver % 2 == 1
+
+
+def faces_camera(camera: Camera, buffers: SceneBuffers, receiver: int) -> bool:
+    """Whether this side of a flat receiver is turned to the camera."""
+    mesh = buffers.world_meshes[buffers.receivers[receiver]]
+    normal = mesh.face_normals()[int(np.argmax(mesh.areas()))]
+    if camera.kind == "orthographic":
+        towards = -camera_frame(camera)[2]
+    else:
+        towards = np.asarray(camera.position, float) - mesh.vertices[0]
+    return bool(towards @ normal < 0.0) == is_back(receiver)
+
+
+def on_both(landings: Mapping[int, Landings]) -> dict[int, Landings]:
+    """Each side with what landed on either."""
+    found: dict[int, Landings] = {}
+    for front in {receiver - is_back(receiver) for receiver in landings}:
+        parts = [landings[side] for side in (front, front + 1) if side in landings]
+        both = Landings(*(np.concatenate([getattr(one, name) for one in parts]) for name in ("positions", "flux_w")))
+        found |= {front: both, front + 1: both}
+    return found

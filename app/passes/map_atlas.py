@@ -63,7 +63,7 @@ class MapAtlas:
         """`size` from `pack`; `placements`: PLACEMENT records, indexed by the receivers. `scratched`: targets that have
         a scratch texture, None for all; splats are added to the others' totals at once, which is right to about
         1e-4."""
-        from .accumulate import Accumulate
+        from .splat_sums import Accumulate
 
         self.ctx = ctx
         self.size = size

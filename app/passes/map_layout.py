@@ -19,11 +19,10 @@ from ..gpu.tiles import Tile, pack
 from ..model.scene import Camera, Scene
 from ..model.scene_camera import camera_frame, camera_rays
 from .borders import lit_borders
-from .landings import Landings
+from .landings import Landings, faces_camera, is_back, on_both
 from .map_atlas import placement_rows
 from .picture_window import PLENTY, PictureWindow, picture_window
 from .plane_frame import PlaneFrame, plane_frame
-from .receiver_sides import faces_camera, is_back, on_both
 
 if TYPE_CHECKING:
     from ..model.geometry.charts import ChartAtlas

@@ -10,9 +10,8 @@ import numpy as np
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.splat_way import way_of
-from .accumulate import copy_texture
 from .light_programs import sum_defines
-from .splat_sums import BIND_SUMS
+from .splat_sums import BIND_SUMS, copy_texture
 
 if TYPE_CHECKING:
     import moderngl

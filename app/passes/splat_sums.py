@@ -1,4 +1,5 @@
-"""Sums in a buffer that compute shaders add splats to, where a device's rasteriser blends slowly."""
+"""Sums of splats: scratch textures that the rasteriser adds them to, and their total; a buffer that compute shaders add
+them to where a device's rasteriser blends slowly."""
 
 from __future__ import annotations
 
@@ -6,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..gpu import shader
+from ..gpu.framebuffers import frame_of
 from ..gpu.splat_way import sums_bytes, way_of
 from .light_programs import sum_defines
 
@@ -13,8 +15,38 @@ if TYPE_CHECKING:
     import moderngl
 
 BIND_SUMS = 2
-_SIDE = 16
-"""Side of a work group."""
+ROWS = 16
+"""Rows, and columns, of a work group."""
+
+
+class Accumulate:
+    """total += scratch; scratch keeps what rounding left out (under half a unit of the total's last place)."""
+
+    def __init__(self, ctx: moderngl.Context) -> None:
+        self._ctx = ctx
+        self._program = shader.compute(ctx, "light/accumulate.comp", {"SIDE": ROWS})
+
+    def run(self, scratch: moderngl.Texture, total: moderngl.Texture) -> None:
+        """Both RGBA32F and of one size."""
+        self.run_rows(scratch, total, 0, total.height)
+
+    def run_rows(self, scratch: moderngl.Texture, total: moderngl.Texture, first: int, rows: int) -> None:
+        """`run` for some rows, a multiple of `ROWS` but for the last."""
+        self._ctx.memory_barrier()
+        scratch.bind_to_image(0, read=True, write=True)
+        total.bind_to_image(1, read=True, write=True)
+        self._program["first_row"].value = first
+        self._program.run(-(-total.width // ROWS), -(-rows // ROWS))
+        self._ctx.memory_barrier()
+
+    def release(self) -> None:
+        shader.release(self._program)
+
+
+def copy_texture(ctx: moderngl.Context, source: moderngl.Texture, target: moderngl.Texture) -> None:
+    """Copy a whole texture to another of the same size and format."""
+    ctx.memory_barrier()
+    ctx.copy_framebuffer(frame_of(ctx, target), frame_of(ctx, source))
 
 
 class SplatSums:
@@ -26,7 +58,7 @@ class SplatSums:
         self._targets = targets
         way = way_of(ctx)
         self.buffer = ctx.buffer(reserve=sums_bytes(size, targets))
-        defines = sum_defines(way) | {"SIDE": _SIDE}
+        defines = sum_defines(way) | {"SIDE": ROWS}
         self._program = shader.compute(ctx, "light/splat_sums.comp", defines, extensions=way.extensions)
         self.clear()
 
@@ -46,7 +78,7 @@ class SplatSums:
         width, height = self._size
         for name, value in (("size", self._size), ("target", first), ("counts", int(counts))):
             self._program[name].value = value
-        self._program.run(-(-width // _SIDE), -(-height // _SIDE), targets)
+        self._program.run(-(-width // ROWS), -(-height // ROWS), targets)
         self._ctx.memory_barrier()
 
     @property

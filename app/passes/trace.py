@@ -22,8 +22,7 @@ from ..gpu.device_traits import DeviceTraits
 from ..gpu.scene_buffers import UNBOUNDED, SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
 from .emission_domain import EmissionDomain
-from .lattice_order import block_of, block_orders, morton_order
-from .lattice_slice import LatticeSlice, Parts, points_of
+from .lattice_slice import LatticeSlice, Parts, block_of, block_orders, morton_order, points_of
 from .light_programs import light_defines
 from .ray_pool import STRUCTS as POOL_STRUCTS
 from .ray_pool import RayPool

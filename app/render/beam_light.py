@@ -30,11 +30,10 @@ from ..beams.search import (
 from ..gpu.context import Context
 from ..gpu.scene_buffers import SceneBuffers
 from ..model.scene import Scene
-from ..passes.landings import Landings
+from ..passes.landings import Landings, is_back
 from ..passes.map_atlas import KIND_PICTURE
 from ..passes.map_layout import MapLayout
 from ..passes.plane_frame import plane_frame
-from ..passes.receiver_sides import is_back
 from ..passes.trace import FluxTally
 from .beam_drawing import BeamDrawing
 from .beam_worker import BeamWorker

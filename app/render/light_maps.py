@@ -15,7 +15,6 @@ from ..gpu.records import RECEIVER
 from ..gpu.shader import Releasable
 from ..gpu.splat_way import way_of
 from ..gpu.tiles import Tile
-from ..passes.accumulate import copy_texture
 from ..passes.border_maps import border_rows, border_texture, inside_share
 from ..passes.caustic_maps import CausticMaps
 from ..passes.contact_lines import read_words, seen_shares
@@ -24,6 +23,7 @@ from ..passes.map_layout import MapLayout, Window
 from ..passes.picture_window import PictureWindow
 from ..passes.resolve import Resolve
 from ..passes.splat import Splatter
+from ..passes.splat_sums import copy_texture
 
 _ROWS = 256
 """Rows of a map that are read at once."""

@@ -16,11 +16,10 @@ from ..model.settings import RenderSettings
 from ..passes.bounce_light import BounceLightPass
 from ..passes.environment_light import EnvironmentLightPass
 from ..passes.gathered_light import MAX_EVENTS
+from ..passes.landings import faces_camera
 from ..passes.map_layout import Window, pixel_side, project
 from ..passes.picture_window import PictureWindow
-from ..passes.plane_frame import plane_frame
-from ..passes.receiver_sides import faces_camera
-from ..passes.texel_map import TexelMap
+from ..passes.plane_frame import TexelMap, plane_frame
 from .light_pass import LightPass
 from .light_stats import LightStats
 

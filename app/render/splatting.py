@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from ..gpu import shader
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
-from ..passes.accumulate import ROWS, Accumulate
 from ..passes.footprint import Photons, SplatSpectra
 from ..passes.splat import CHUNK, FLUSH_SHARE
+from ..passes.splat_sums import ROWS, Accumulate
 
 if TYPE_CHECKING:
     import moderngl

@@ -21,7 +21,7 @@ from spectrasplat.model.optics import spectrum
 from spectrasplat.passes.beam_records import levels
 from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
 from spectrasplat.passes.map_layout import MapLayout
-from spectrasplat.passes.texel_map import TexelMap
+from spectrasplat.passes.plane_frame import TexelMap
 
 BAND = 0.25, 0.5
 W = 3

@@ -21,8 +21,7 @@ from spectrasplat.passes.caustic_maps import CausticMaps
 from spectrasplat.passes.map_atlas import MapAtlas, placement_rows
 from spectrasplat.passes.map_layout import MapLayout, project
 from spectrasplat.passes.picture_window import PictureWindow, picture_window
-from spectrasplat.passes.plane_frame import plane_frame
-from spectrasplat.passes.texel_map import TexelMap
+from spectrasplat.passes.plane_frame import TexelMap, plane_frame
 from spectrasplat.render.still import render
 
 from tests.gpu.camera_rig import REFLECTANCE, floor, opened_camera_pass, released, white_texels

@@ -16,7 +16,7 @@ from scipy.spatial import KDTree
 from spectrasplat.base import paths
 from spectrasplat.base.random_words import PASS_GENERATORS
 from spectrasplat.gpu.records import LATTICE_BIT, trace_parameters
-from spectrasplat.passes.pixel_lattice import cells_of, pixel_lattice
+from spectrasplat.passes.sample_spread import cells_of, pixel_lattice
 from spectrasplat.reference.emission import GOLDEN, PLASTIC, lattice_point
 from spectrasplat.reference.random_numbers import hash_combine, hash_pcg, kronecker, unit_float
 from spectrasplat.stress.rigs.glsl_function import evaluate

@@ -1,9 +1,9 @@
-"""Short loops are written out: `gpu/glsl_unrolling`."""
+"""Short loops are written out: `gpu/dead_code.unrolled`."""
 
 from __future__ import annotations
 
 import pytest
-from spectrasplat.gpu.glsl_unrolling import unrolled
+from spectrasplat.gpu.dead_code import unrolled
 
 COUNTS = {"TWO": 2, "NONE": 0, "1": 1, "MANY": 9}
 

@@ -10,9 +10,8 @@ import pytest
 from spectrasplat.gpu.dispatch_budget import DispatchBudget
 from spectrasplat.passes.beam_records import hull_areas
 from spectrasplat.passes.beam_splat import TEXELS, portion_end
-from spectrasplat.passes.lattice_order import GOLDEN, block_of, block_orders, morton_order
-from spectrasplat.passes.lattice_slice import LatticeSlice
-from spectrasplat.passes.pixel_lattice import LOOKS, cells_of, looks_lattice, pixel_lattice
+from spectrasplat.passes.lattice_slice import GOLDEN, LatticeSlice, block_of, block_orders, morton_order
+from spectrasplat.passes.sample_spread import LOOKS, cells_of, looks_lattice, pixel_lattice
 from spectrasplat.render.pass_sizes import (
     ALPHA,
     FIRST_PHOTONS,

@@ -14,8 +14,7 @@ from spectrasplat.base.progress import Phase, ProgressReporter
 from spectrasplat.render.frame_progress import PHOTON_S, SAMPLE_S, FrameProgress
 from spectrasplat.render.light_stats import LightStats
 from spectrasplat.render.time_budget import TimeBudget
-from spectrasplat.render.viewer.stats import LiveStats
-from spectrasplat.render.viewer.work_tally import WorkTally, light_counts
+from spectrasplat.render.viewer.stats import LiveStats, WorkTally, light_counts
 from spectrasplat.ui.message_box import broken
 from spectrasplat.ui.panels.status_bar import progress_words
 

@@ -27,7 +27,7 @@ from ...model.optics.glass import LINE_D_NM
 from ...model.optics.spectrum import Spectrum
 from ...model.scene import Scene, SceneObject
 from ...model.settings import RenderSettings
-from ...passes.receiver_sides import faces_camera
+from ...passes.landings import faces_camera
 from ..bake import check_receiver
 from ..frames import FrameRenderer
 from ..lit_receiver import up_of

@@ -35,7 +35,7 @@ from .live_camera import DIRECT_S, MOVED_S
 from .live_light import LiveLight
 from .refit import needs_new_maps
 from .schedule import Action, Happened, ShowMaps
-from .work_tally import light_counts
+from .stats import light_counts
 
 if TYPE_CHECKING:
     from ...gpu.context import Context

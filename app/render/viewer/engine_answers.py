@@ -18,8 +18,7 @@ from .live_camera import LiveCamera
 from .photon_queries import QUERIED_PHOTONS, CausticSpectrum, spectrum_at, world_photons
 from .refit import is_judged
 from .schedule import CameraState, Schedule
-from .stats import LiveStats
-from .work_tally import WorkTally
+from .stats import LiveStats, WorkTally
 
 if TYPE_CHECKING:
     import moderngl

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...edit.stored_photons import StoredPhotons
-from ...passes.receiver_sides import faces_camera
+from ...passes.landings import faces_camera
 from .invalidation import shown_glasses
 
 if TYPE_CHECKING:

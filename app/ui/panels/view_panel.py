@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
+import numpy as np
+from imgui_bundle import imgui
+
+from ...base.colour_maps import FALSE_COLOUR, sample
 from ...edit import edits
 from ...edit.camera_controls import focus_at
 from ...edit.state import SOLO_START_NM, Display, State, ToneCurve
 from ...model.contacts import world_bounds
 from ...model.scene_render import MAX_GLARE
+from .. import theme
 from ..view_model import ViewModel
-from . import false_colour, spectrum_strip, widgets
+from . import rows, spectrum_strip, widgets
 from .camera_rows import draw_camera_rows
 from .methods import MENU_METHODS, METHOD_NAMES, METHOD_TIPS
 
@@ -27,6 +33,7 @@ _TARGETS = {str(n * 1_000_000): f"{n} million" for n in (1, 4, 16, 32, 64, 128, 
 
 _sweeping = {"on": False}
 """Whether the sweep runs: memory of the interface, like a scroll position."""
+_LEGEND_STEPS = 48
 
 
 def draw_view(state: State, view_model: ViewModel) -> State:
@@ -90,8 +97,45 @@ def _false_colour(display: Display, exposure_ev: float) -> Display:
         new_low = min(new_low, new_high - 1.0)
     else:
         new_high = max(high, new_low + 1.0)
-    false_colour.legend((new_low, new_high), exposure_ev)
+    _legend((new_low, new_high), exposure_ev)
     return replace(display, false_colour_stops=(new_low, new_high))
+
+
+def _legend(stops: tuple[float, float], exposure_ev: float) -> None:
+    """A bar of the false colours, as wide as the window, its ends labelled in stops about display white; `exposure_ev`
+    turns a stop into a luminance for the tooltip."""
+    low, high = stops
+    width, height = imgui.get_content_region_avail().x, theme.em(0.9)
+    start = imgui.get_cursor_screen_pos()
+    imgui.invisible_button("##false colour", imgui.ImVec2(width, height))
+    share = (imgui.get_mouse_pos().x - start.x) / max(width, 1.0)
+    stop = low + min(max(share, 0.0), 1.0) * (high - low)
+    luminance = 2.0 ** float(np.clip(stop - exposure_ev, -60.0, 60.0))
+    rows.explain("False colour bar", f"{stop:+.1f} stops about display white: {luminance:.4g} lm/(sr unit²).")
+    corner = imgui.ImVec2(start.x + width, start.y + height)
+    spectrum_strip.draw_gradient(imgui.get_window_draw_list(), start, corner, _legend_colours())
+    _legend_labels(low, high, width)
+
+
+def _legend_labels(low: float, high: float, width: float) -> None:
+    left = imgui.get_cursor_pos_x()
+    imgui.text_disabled(f"{low:+.1f}")
+    if low < 0.0 < high:
+        _legend_label(left, width, -low / (high - low), "display white" if width > theme.em(14) else "0")
+    _legend_label(left, width, 1.0, f"{high:+.1f}")
+
+
+def _legend_label(left: float, width: float, share: float, text: str) -> None:
+    """A label centred at `share` of the bar, kept within it."""
+    length = imgui.calc_text_size(text).x
+    imgui.same_line(left + min(max(share * width - length / 2, 0.0), width - length))
+    imgui.text_disabled(text)
+
+
+@cache
+def _legend_colours() -> tuple[int, ...]:
+    scale = sample(FALSE_COLOUR, np.linspace(0.0, 1.0, _LEGEND_STEPS + 1)).astype(float)
+    return tuple(theme.packed((r, g, b, 1.0)) for r, g, b in scale.tolist())
 
 
 def _solo(state: State) -> State:
