@@ -3,22 +3,29 @@ like."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from spectrasplat.features.features import Features
+from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.records import NONE, PLACEMENT, RECEIVER
 from spectrasplat.gpu.scene_buffers import SceneBuffers
 from spectrasplat.model.geometry.mesh import make_mesh
+from spectrasplat.model.geometry.primitives import plane
+from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics import spectrum
 from spectrasplat.model.optics.colorimetry import K_M, cmf_xyz, daylight_per_lumen, rgb709_to_xyz, xyz_to_rgb709
-from spectrasplat.model.scene import Camera, Diffuse, Scene, SceneObject
+from spectrasplat.model.placement import rotation_about
+from spectrasplat.model.scene import Camera, Diffuse, Material, Scene, SceneObject
 from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes.camera import CameraPass
 from spectrasplat.passes.caustic_maps import CausticMaps
+from spectrasplat.render import still
 from spectrasplat.render.device_scene import spectral_axis
+from spectrasplat.stress.rigs import camera_probe
 
 REFLECTANCE = 0.5
 WHITE = spectrum.illuminant("D65").scaled_to_luminous(1000.0)  # R = G = B = 1000
@@ -121,6 +128,51 @@ def at(x, y, z) -> np.ndarray:
     matrix = np.eye(4)
     matrix[:3, 3] = x, y, z
     return matrix
+
+
+def tilted(degrees: float) -> np.ndarray:
+    """Object to world: turned about x."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation_about((1.0, 0.0, 0.0), np.radians(degrees))
+    return matrix
+
+
+def sheets_in_a_furnace(
+    gl: Context,
+    sheets: Sequence[tuple[Material, float]],
+    polarised: bool = False,
+    settings: RenderSettings = camera_probe.FEW,
+) -> list[np.ndarray]:
+    """(3,) of each sheet of a material, turned by so many degrees: what it throws back and lets through of white light
+    from everywhere. They are one scene, so far apart that none sees another, and one program."""
+    objects, cameras = [], []
+    for i, (material, degrees) in enumerate(sheets):
+        x = 20.0 * i
+        objects.append(SceneObject(f"sheet {i}", plane(1.0, 1.0), material, at(x, 0.0, 0.0) @ tilted(degrees)))
+        cameras.append(replace(ABOVE, position=(x, 0.0, 4.0), target=(x, 0.0, 0.0), vertical_extent=0.05))
+    scene = camera_probe.white_furnace(*objects, camera=cameras[0])
+    scene = replace(scene, render=replace(scene.render, polarisation=polarised))
+    with camera_probe.opened_camera_pass(gl, scene, settings) as camera_pass:
+        return [camera_probe.look_with(camera_pass, camera, settings).mean for camera in cameras]
+
+
+def in_the_sun(*above: SceneObject) -> Scene:
+    """A grey floor in sunlight from straight above and what stands over it, seen from below that."""
+    camera = replace(ABOVE, position=(0.0, 0.0, 0.6), vertical_extent=2.0)
+    return Scene("in the sun", camera, (DirectionalLight("sun", WHITE, direction=DOWN),), (floor(), *above))
+
+
+def shares_of_the_sun(gl: Context, stands: Sequence[Sequence[SceneObject]], method: str = "srd") -> np.ndarray:
+    """(n, 3): share of the sun that lands under each of what stands beside each other, a unit square in outline and
+    higher than 0.6."""
+    row = []
+    for i, stand in enumerate(stands):
+        move = at(2.0 * i + 1.0 - len(stands), 0.0, 0.0)
+        row += [replace(o, name=f"{o.name} {i}", object_to_world=move @ o.object_to_world) for o in stand]
+    settings = RenderSettings(8 * len(stands), 8, photons=20_000 * len(stands), spp=16, method=method)
+    rgb = still.render(in_the_sun(*row), settings, context=gl).rgb.astype(float)
+    middles = rgb.reshape(8, len(stands), 8, 3)[3:5, :, 3:5]
+    return middles.mean(axis=(0, 2)) / (REFLECTANCE * 1000.0 / np.pi)
 
 
 def flat_maps(gl, scene: SceneBuffers, windows, channels: np.ndarray, scale=1.0) -> CausticMaps:

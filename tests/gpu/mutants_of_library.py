@@ -114,7 +114,7 @@ OF_LIBRARY = {
         "lib/rough_energy.glsl",
         "reflected / (1.0 - thrown * reflected)",
         "reflected",
-        "gpu/test_rough_metal.py::test_a_rough_mirror_in_a_furnace",
+        "gpu/test_rough_metal.py::test_rough_mirrors_in_a_furnace",
     ),
     "a film that varies by the distance, not its square": Mutant(
         "lib/film.glsl",

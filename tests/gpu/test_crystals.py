@@ -17,9 +17,7 @@ from spectrasplat.model.optics import crystals
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.glass import Dispersion, cauchy, constant
 from spectrasplat.model.scene import Camera, Dielectric, Polariser, Scene, SceneObject
-from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.optics import unit
-from spectrasplat.render.still import render
 from spectrasplat.render.viewer.dirty_level import DirtyLevel
 from spectrasplat.render.viewer.invalidation import dirty_level, shown_glasses
 from spectrasplat.stress.rigs.camera_probe import (
@@ -30,8 +28,7 @@ from spectrasplat.stress.rigs.camera_probe import (
 )
 from spectrasplat.stress.rigs.gpu_paths import Photons, extruded, placed, screen, trace_beam
 
-from tests.gpu.camera_rig import at
-from tests.gpu.test_thin_films import LUX, patch
+from tests.gpu.camera_rig import at, in_the_sun, shares_of_the_sun
 
 DOWN = np.array([0.0, 0.0, -1.0])
 N_O, N_E = 1.6584, 1.4864
@@ -202,30 +199,27 @@ def test_a_stone_of_calcite_is_not_seen_in_a_furnace(gl: Context) -> None:
     assert render_probe(gl, white_furnace(stone, camera=AWAY), FEW).mean == pytest.approx(1.0, abs=2e-3)
 
 
-@pytest.mark.parametrize("retardance_nm", [None, 280.0, 1000.0])
-def test_sheets_before_white(gl: Context, retardance_nm: float | None) -> None:
+def test_sheets_before_white(gl: Context) -> None:
     """Crossed polarisers with a third between at 30°, or a wave plate: seen by the camera, also with few samples, and
     as the sun's light lies behind them."""
-    turn = np.radians(30.0)
-    passed = np.full(401, 0.5 * np.cos(turn) ** 2 * np.sin(turn) ** 2)
-    between = sheet(2.0, 30.0)
-    if retardance_nm is not None:
-        passed = 0.5 * np.sin(2.0 * turn) ** 2 * np.sin(np.pi * retardance_nm / VISIBLE_NM) ** 2
-        between = sheet(2.0, 30.0, crossed_transmittance=1.0, retardance_nm=retardance_nm)
-    sheets, expected = (sheet(2.5, 0.0), between, sheet(1.5, 90.0)), daylight_mean(passed)
-    seen = render_probe(gl, white_furnace(*sheets, camera=UPRIGHT), replace(FEW, spp=4)).mean
-    assert seen == pytest.approx(expected, rel=0.01, abs=2e-3)
-    lit = patch(between)
-    lit = replace(lit, objects=(lit.objects[0], *sheets))
-    floor = render(lit, RenderSettings(8, 8, photons=20_000, spp=16), context=gl).rgb.mean(axis=(0, 1))
-    assert floor == pytest.approx(LUX * 0.5 / np.pi * expected, rel=0.015, abs=2e-3 * LUX / np.pi)
+    turn, third = np.radians(30.0), sheet(2.0, 30.0)
+    between, passed = [third], [np.full(401, 0.5 * np.cos(turn) ** 2 * np.sin(turn) ** 2)]
+    for retardance_nm in (280.0, 1000.0):
+        between.append(sheet(2.0, 30.0, crossed_transmittance=1.0, retardance_nm=retardance_nm))
+        passed.append(0.5 * np.sin(2.0 * turn) ** 2 * np.sin(np.pi * retardance_nm / VISIBLE_NM) ** 2)
+    stands = [(sheet(2.5, 0.0), middle, sheet(1.5, 90.0)) for middle in between]
+    expected = daylight_mean(np.array(passed))
+    for sheets, wanted in zip(stands, expected, strict=True):
+        seen = render_probe(gl, white_furnace(*sheets, camera=UPRIGHT), replace(FEW, spp=4)).mean
+        assert seen == pytest.approx(wanted, rel=0.01, abs=2e-3)
+    assert shares_of_the_sun(gl, stands) == pytest.approx(expected, rel=0.015, abs=4e-3)
 
 
 def test_what_edits_of_a_crystal_cost() -> None:
     """In the viewer photons follow both indices where n_d stays; for another axis they are traced anew, and glass takes
     other programs."""
     material = crystal((0.4, 0.3, 0.8), cauchy([1.62, 0.012]), cauchy([1.46, 0.006]))
-    scene = patch(placed("block", box((1.0, 1.0, 0.2)), material))
+    scene = in_the_sun(placed("block", box((1.0, 1.0, 0.2)), material))
 
     def edited(other: Dielectric) -> Scene:
         return replace(scene, objects=(scene.objects[0], replace(scene.objects[1], material=other)))

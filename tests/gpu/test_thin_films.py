@@ -9,24 +9,18 @@ import pytest
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.film_stacks import film_stacks
 from spectrasplat.model.geometry.primitives import box, plane
-from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.materials.coating import Coating, preset
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.metals import metals
-from spectrasplat.model.optics.spectrum import illuminant
 from spectrasplat.model.optics.thin_films import AIR, Film, Layer, Stack, power
-from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Material, Mirror, Scene, SceneObject
-from spectrasplat.model.settings import RenderSettings
+from spectrasplat.model.scene import Camera, Dielectric, Material, Mirror, Scene, SceneObject
 from spectrasplat.reference.camera_reference import cached_camera_reference
-from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.camera_probe import PROBE, daylight_mean, render_probe, resized, slope_sky, with_sky
 from spectrasplat.stress.rigs.probe import blocks
 
-from tests.gpu.camera_rig import at
-from tests.gpu.test_thin_sheets import tilted
+from tests.gpu.camera_rig import at, shares_of_the_sun, sheets_in_a_furnace, tilted
 
-LUX = 1000.0
 GLASS = constant(1.5)
 _SILVER = Layer(metals()["silver"], 25.0)
 ETALON = Coating(Film((_SILVER, Layer(constant(1.5), 20_000.0), _SILVER)))
@@ -58,31 +52,21 @@ def shares(material: Material, cosine: float) -> tuple[np.ndarray, np.ndarray]:
     return reflected.reshape(nm.shape).mean(axis=1), passed.reshape(nm.shape).mean(axis=1)
 
 
-def patch(above: SceneObject) -> Scene:
-    sun = DirectionalLight("sun", illuminant("D65").scaled_to_luminous(LUX), direction=(0.0, 0.0, -1.0))
-    floor = SceneObject("floor", plane(6.0, 6.0), Diffuse((0.5, 0.5, 0.5)))
-    camera = Camera((0.0, -6.0, 5.0), (0.0, 0.0, 0.0), vertical_fov_deg=2.0)
-    return Scene("patch", camera, (sun,), (floor, above))
-
-
 @pytest.mark.parametrize(
-    ("name", "method"),
-    [*((name, "srd") for name in SHEETS), ("soap of 400 nm", "hero"), ("silvered", "stochastic-even")],
+    ("names", "method"), [(tuple(SHEETS), "srd"), (("soap of 400 nm",), "hero"), (("silvered",), "stochastic-even")]
 )
-def test_a_patch_of_sun_behind_a_film(gl: Context, name: str, method: str) -> None:
-    scene = patch(SceneObject("sheet", plane(1.0, 1.0), SHEETS[name], at(0.0, 0.0, 1.5)))
-    settings = RenderSettings(8, 8, photons=40_000, spp=16, method=method)
-    seen = render(scene, settings, context=gl).rgb.mean(axis=(0, 1))
-    expected = daylight_mean(shares(SHEETS[name], 1.0)[1])
-    assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=0.01, abs=1e-3 * LUX / np.pi)
+def test_patches_of_sun_behind_films(gl: Context, names: tuple[str, ...], method: str) -> None:
+    found = shares_of_the_sun(
+        gl, [[SceneObject("sheet", plane(1.0, 1.0), SHEETS[name], at(0.0, 0.0, 1.5))] for name in names], method
+    )
+    expected = np.array([daylight_mean(shares(SHEETS[name], 1.0)[1]) for name in names])
+    assert found == pytest.approx(expected, rel=0.01, abs=2e-3)
 
 
 def test_a_coated_block_lets_more_through(gl: Context) -> None:
-    scene = patch(SceneObject("block", box((1.0, 1.0, 0.2)), COATED, at(0.0, 0.0, 1.5)))
-    seen = render(scene, RenderSettings(8, 8, photons=40_000, spp=16), context=gl).rgb.mean(axis=(0, 1))
+    (found,) = shares_of_the_sun(gl, [[SceneObject("block", box((1.0, 1.0, 0.2)), COATED, at(0.0, 0.0, 1.5))]])
     reflected, passed = shares(COATED, 1.0)
-    expected = daylight_mean(passed**2 / (1.0 - reflected**2))
-    assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=3e-3)
+    assert found == pytest.approx(daylight_mean(passed**2 / (1.0 - reflected**2)), rel=3e-3)
 
 
 def _faces(*reflected: np.ndarray) -> np.ndarray:
@@ -93,17 +77,16 @@ def _faces(*reflected: np.ndarray) -> np.ndarray:
 def test_a_coating_in_water_is_one_in_water(gl: Context) -> None:
     """A coated block within another of lower rank."""
     film, water = Film((Layer(constant(2.3), 60.0),)), constant(1.33)
-    scene = patch(SceneObject("water", box((1.2, 1.2, 0.4)), Dielectric(water), at(0.0, 0.0, 1.5)))
+    around = SceneObject("water", box((1.2, 1.2, 0.4)), Dielectric(water), at(0.0, 0.0, 1.5))
     coated = Dielectric(GLASS, priority=1, coating=Coating(film))
     block = SceneObject("block", box((1.0, 1.0, 0.2)), coated, at(0.0, 0.0, 1.5))
-    scene = replace(scene, objects=(*scene.objects, block))
-    seen = render(scene, RenderSettings(8, 8, photons=40_000, spp=16), context=gl).rgb.mean(axis=(0, 1))
+    (found,) = shares_of_the_sun(gl, [[around, block]])
     inner, _ = power(Stack(water, film, GLASS), 1.0, VISIBLE_NM)
     outer = np.full(401, (0.33 / 2.33) ** 2)
     expected, in_air = (
         daylight_mean(_faces(outer, r, r, outer)) for r in (inner, power(Stack(AIR, film, GLASS), 1.0, VISIBLE_NM)[0])
     )
-    assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=5e-3)
+    assert found == pytest.approx(expected, rel=5e-3)
     assert abs(in_air / expected - 1.0).min() > 0.03
 
 
@@ -119,19 +102,21 @@ def test_gold_behind_glass_is_paler_than_in_air(gl: Context, polarised: bool) ->
     assert render_probe(gl, scene, PROBE).mean == pytest.approx(expected, rel=3e-3)
 
 
-@pytest.mark.parametrize(("degrees", "polarised"), [(0.0, False), (50.0, True), (80.0, False), (80.0, True)])
-@pytest.mark.parametrize("name", [*SHEETS, "gold", "oiled aluminium"])
-def test_a_film_in_a_furnace(gl: Context, name: str, degrees: float, polarised: bool) -> None:
+METALS = Mirror(metal="gold"), Mirror(metal="aluminium", film_nm=200.0, film_index=1.5)
+FILMS = (*SHEETS.values(), *METALS)
+
+
+@pytest.mark.parametrize(
+    ("films", "polarised", "angles"),
+    [(FILMS, False, (0.0, 80.0)), (FILMS[:5], True, (50.0, 80.0)), (FILMS[5:], True, (50.0, 80.0))],
+)
+def test_films_in_a_furnace(gl: Context, films: tuple[Material, ...], polarised: bool, angles: tuple) -> None:
     """All that comes back of white light: all of it, but for what metal absorbs."""
-    others = {"gold": Mirror(metal="gold"), "oiled aluminium": Mirror(metal="aluminium", film_nm=200.0, film_index=1.5)}
-    material = others.get(name) or SHEETS[name]
-    camera = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=0.05)
-    sheet = SceneObject("sheet", plane(1.0, 1.0), material, tilted(degrees))
-    scene = Scene("furnace", camera, (), (sheet,), background_rgb=(1.0, 1.0, 1.0))
-    scene = replace(scene, render=replace(scene.render, polarisation=polarised))
-    reflected, passed = shares(material, float(np.cos(np.radians(degrees))))
-    expected = daylight_mean(reflected + (0.0 if material.is_mirror else passed))
-    assert render_probe(gl, scene, PROBE).mean == pytest.approx(expected, rel=5e-3)
+    sheets = [(film, degrees) for film in films for degrees in angles]
+    for (film, degrees), seen in zip(sheets, sheets_in_a_furnace(gl, sheets, polarised), strict=True):
+        reflected, passed = shares(film, float(np.cos(np.radians(degrees))))
+        expected = daylight_mean(reflected + (0.0 if film.is_mirror else passed))
+        assert seen == pytest.approx(expected, rel=5e-3), (film, degrees)
 
 
 @pytest.mark.parametrize("polarised", [False, True])

@@ -11,15 +11,10 @@ import numpy as np
 import pytest
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.geometry.primitives import box, plane
-from spectrasplat.model.lights import DirectionalLight
 from spectrasplat.model.optics.colorimetry import rgb_basis
 from spectrasplat.model.optics.glass import constant
-from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.placement import rotation_about
-from spectrasplat.model.scene import Camera, Dielectric, Diffuse, Scene, SceneObject
-from spectrasplat.model.settings import RenderSettings
+from spectrasplat.model.scene import Camera, Dielectric, SceneObject
 from spectrasplat.reference.camera_reference import cached_camera_reference
-from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.camera_probe import (
     PROBE,
     daylight_mean,
@@ -32,7 +27,7 @@ from spectrasplat.stress.rigs.camera_probe import (
 from spectrasplat.stress.rigs.glsl_function import as_f32, evaluate
 from spectrasplat.stress.rigs.probe import blocks
 
-from tests.gpu.camera_rig import at
+from tests.gpu.camera_rig import at, shares_of_the_sun, sheets_in_a_furnace, tilted
 
 N = 1.5
 TINT = (0.9, 0.3, 0.2)
@@ -41,13 +36,6 @@ SOLID = Dielectric(constant(N), transmittance_rgb=TINT)
 CLEAR = Dielectric(constant(N))
 FACE = float(fresnel(1.0, N))
 BOTH = 2.0 * FACE / (1.0 + FACE)
-LUX = 1000.0
-
-
-def tilted(degrees: float) -> np.ndarray:
-    turn = np.eye(4)
-    turn[:3, :3] = rotation_about((1.0, 0.0, 0.0), np.radians(degrees))
-    return turn
 
 
 def pane(material: Dielectric, z: float) -> SceneObject:
@@ -81,17 +69,12 @@ PATCHES: dict[str, tuple[tuple[SceneObject, ...], np.ndarray]] = {
 
 
 @pytest.mark.parametrize(
-    ("name", "method"), [*((name, "srd") for name in PATCHES), ("sheet", "hero"), ("solid", "stochastic-even")]
+    ("names", "method"), [(tuple(PATCHES), "srd"), (("sheet",), "hero"), (("solid",), "stochastic-even")]
 )
-def test_a_patch_of_sun(gl: Context, name: str, method: str) -> None:
-    above, expected = PATCHES[name]
-    sun = DirectionalLight("sun", illuminant("D65").scaled_to_luminous(LUX), direction=(0.0, 0.0, -1.0))
-    floor = SceneObject("floor", plane(6.0, 6.0), Diffuse((0.5, 0.5, 0.5)))
-    camera = Camera((0.0, -6.0, 5.0), (0.0, 0.0, 0.0), vertical_fov_deg=2.0)
-    scene = Scene("patch", camera, (sun,), (floor, *above))
-    seen = render(scene, RenderSettings(8, 8, photons=20_000, spp=16, method=method), context=gl).rgb.mean(axis=(0, 1))
+def test_patches_of_sun(gl: Context, names: tuple[str, ...], method: str) -> None:
+    found = shares_of_the_sun(gl, [PATCHES[name][0] for name in names], method)
     # What two reflections between a sheet and its tint would add is below a thousandth.
-    assert seen == pytest.approx(LUX * 0.5 / np.pi * expected, rel=0.012)
+    assert found == pytest.approx(np.array([PATCHES[name][1] for name in names]), rel=0.012)
 
 
 def test_both_faces(gl: Context) -> None:
@@ -107,16 +90,13 @@ def test_both_faces(gl: Context) -> None:
         np.testing.assert_allclose(got[name], wanted, atol=2e-5)
 
 
-@pytest.mark.parametrize("degrees", [0.0, 60.0, 80.0])
-@pytest.mark.parametrize("material", [SHEET, Dielectric(constant(N), thin=True)])
-def test_a_sheet_in_a_furnace(gl: Context, degrees: float, material: Dielectric) -> None:
-    camera = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), "orthographic", vertical_extent=0.05)
-    sheet = SceneObject("sheet", plane(1.0, 1.0), material, tilted(degrees))
-    scene = Scene("furnace", camera, (), (sheet,), background_rgb=(1.0, 1.0, 1.0))
-    r = float(fresnel(np.cos(np.radians(degrees)), N))
-    both = 2.0 * r / (1.0 + r)
-    passed = (1.0 - both) * (rgb_basis() @ np.array(material.transmittance_rgb))
-    assert render_probe(gl, scene, PROBE).mean == pytest.approx(daylight_mean(both + passed), rel=2e-3)
+def test_sheets_in_a_furnace(gl: Context) -> None:
+    sheets = [(m, degrees) for m in (SHEET, Dielectric(constant(N), thin=True)) for degrees in (0.0, 60.0, 80.0)]
+    for (material, degrees), seen in zip(sheets, sheets_in_a_furnace(gl, sheets), strict=True):
+        r = float(fresnel(np.cos(np.radians(degrees)), N))
+        both = 2.0 * r / (1.0 + r)
+        passed = (1.0 - both) * (rgb_basis() @ np.array(material.transmittance_rgb))
+        assert seen == pytest.approx(daylight_mean(both + passed), rel=2e-3), (material, degrees)
 
 
 @pytest.mark.parametrize("polarised", [False, True])

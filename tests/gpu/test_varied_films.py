@@ -28,8 +28,7 @@ from spectrasplat.render.still import render
 from spectrasplat.stress.rigs.camera_probe import PROBE, daylight_mean, render_probe, resized, slope_sky, with_sky
 from spectrasplat.stress.rigs.probe import blocks
 
-from tests.gpu.camera_rig import at
-from tests.gpu.test_thin_sheets import tilted
+from tests.gpu.camera_rig import at, tilted
 from tests.statistical.test_rough_glass import error, shares_of
 
 GLASS, AIR = constant(1.5), constant(1.0)
