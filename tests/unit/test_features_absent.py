@@ -10,6 +10,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import chain
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -26,7 +27,6 @@ from spectrasplat.gpu.map_channels import MapChannels
 from spectrasplat.gpu.program_use import use_of
 from spectrasplat.gpu.scene_records import SCENE_STRUCTS
 from spectrasplat.gpu.schema import Struct
-from spectrasplat.gpu.texture_store import PICTURE
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
@@ -60,30 +60,39 @@ NUMBERS: Defines = {
 """Stand-ins for what only a scene's data give."""
 
 
-def sources(features: Features) -> list[shader.Source]:
-    """The light pass's and the camera's sources."""
-    return [*light_sources(features), *gathered_sources(features), *camera_sources(features)]
+Program = tuple[str, Defines, tuple[Struct, ...]]
+"""Its shader, defines and structs."""
+
+
+def programs(features: Features) -> Iterator[Program]:
+    """The light pass's and the camera's."""
+    return chain(light_programs(features), gathered_programs(features), camera_programs(features))
+
+
+def sources(features: Features, *names: str) -> list[shader.Source]:
+    """Of these shaders (none: of all)."""
+    return [shader.load_source(*each) for each in programs(features) if not names or each[0] in names]
 
 
 known_sources = cache(sources)
 """Those of the shaders as they are."""
 
 
-def light_sources(features: Features) -> Iterator[shader.Source]:
+def light_programs(features: Features) -> Iterator[Program]:
     photon = records.photon_record(features.spectral_groups)
     structs = (*SCENE_STRUCTS, records.ray_record_of(features), photon, records.OUTCOME)
     structs += (records.trace_parameters(), records.EMIT_PARAMETERS, *((records.FLIGHT,) if features.flights else ()))
     light = light_defines(features, DeviceTraits()) | NUMBERS
-    yield shader.load_source("light/trace.comp", light, structs)
-    yield shader.load_source("light/emit.comp", light | switched(LIGHT_POINT=True), structs)
+    yield "light/trace.comp", light, structs
+    yield "light/emit.comp", light | switched(LIGHT_POINT=True), structs
     placed = (photon, records.PLACEMENT, records.RECEIVER, SPLAT, records.GAIN_BOX)
-    yield shader.load_source("light/footprint.comp", footprint_defines(features), placed)
+    yield "light/footprint.comp", footprint_defines(features), placed
     for fragment, defines in draw_variants(features).values():
         for name in ("light/splat.vert", fragment):
-            yield shader.load_source(name, defines, (SPLAT,))
+            yield name, defines, (SPLAT,)
 
 
-def gathered_sources(features: Features) -> Iterator[shader.Source]:
+def gathered_programs(features: Features) -> Iterator[Program]:
     defines = features.defines() | NUMBERS | {"MOST_ASKED": 24, "BIND_PLACES": 8, "BIND_ASKED": 9, "BIND_SUMS": 10}
     structs: tuple[Struct, ...] = (*SCENE_STRUCTS, PLACE, gathered_light.PARAMETERS, gathered_light.DIRECTION)
     for of_receivers, on in ((False, features.environment_lights), (True, features.bounces)):
@@ -91,24 +100,23 @@ def gathered_sources(features: Features) -> Iterator[shader.Source]:
             disperses = features.environment_spectrum and not of_receivers
             chosen = defines | switched(OF_RECEIVERS=of_receivers, FOLLOWS_SPECULAR=True, GATHERED_SPECTRUM=disperses)
             chosen |= {"GATHER_TAPS": gathered_light.TAPS}
-            yield shader.load_source("light/gather.comp", chosen, (*structs, gathered_light.SUM))
+            yield "light/gather.comp", chosen, (*structs, gathered_light.SUM)
     if features.haze:
         structs = (records.FLIGHT, CAMERA_PARAMETERS, HAZE_PARAMETERS)
         for stage in ("vert", "frag"):
-            yield shader.load_source(f"camera/haze.{stage}", {"TARGETS": 1}, structs)
+            yield f"camera/haze.{stage}", {"TARGETS": 1}, structs
 
 
-def camera_sources(features: Features, images: dict[str, int] | None = None) -> list[shader.Source]:
-    """The camera's one program, or two where it sees glass or mirrors; `images`: symbols of the texture store."""
+def camera_programs(features: Features) -> list[Program]:
+    """The camera's one program, or two where it sees glass or mirrors."""
     buffers = SimpleNamespace(scene=SimpleNamespace(lights=()), features=features, defines=NUMBERS)
     maps = MapChannels(tents_nm=(550.0,) * features.map_tents)
     shown = camera_defines(cast(Any, buffers), Channels(), "beauty", maps)
-    shown |= NUMBERS | switched(VISIBLE_LIGHTS=True) | (images or {})
+    shown |= NUMBERS | switched(VISIBLE_LIGHTS=True)
     shown |= switched(LENS=features.lens)
     structs = (*SCENE_STRUCTS, CAMERA_LIGHT, CAMERA_PARAMETERS, records.RECEIVER, records.PLACEMENT)
-    structs += (PICTURE,) if images else ()
-    programs = [direct_defines(shown), *([shown] if features.camera_specular else [])]
-    return [shader.load_source("camera/camera.comp", defines, structs) for defines in programs]
+    variants = [direct_defines(shown), *([shown] if features.camera_specular else [])]
+    return [("camera/camera.comp", defines, structs) for defines in variants]
 
 
 def scene_features(name: str) -> Features:
@@ -121,8 +129,10 @@ def test_names_come_and_go_with_their_feature(field: str) -> None:
     names = ROWS[field].names
     # Polarised light has no mean reflectance of its own.
     everything = replace(EVERYTHING, polarised=field == "polarised")
-    assert {s for source in known_sources(everything) for s in occurring(source, names)} == set(names)
-    for source in sources(without(everything, field, *CAMERA_TOO.get(field, ()))):
+    found = [(source.name, name) for source in known_sources(everything) for name in occurring(source, names)]
+    assert {name for _, name in found} == set(names)
+    holders = {shader_name for shader_name, _ in found}
+    for source in sources(without(everything, field, *CAMERA_TOO.get(field, ())), *holders):
         assert occurring(source, names) == (), source.name
 
 
