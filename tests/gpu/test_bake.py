@@ -18,6 +18,8 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.bake import bake, placement_path
 from spectrasplat.render.frames import FrameRenderer
 
+from tests.unit.scene_texts import load
+
 SETTINGS = RenderSettings(width=96, height=64, photons=60_000)
 
 BALL = """
@@ -44,9 +46,7 @@ BOWL = '[[objects]]\nname = "bowl"\nshape = "sphere"\nradius = 2.0\nposition = [
 
 
 def scene_of(tmp_path: Path, receiver: str) -> Scene:
-    file = tmp_path / "scene.toml"
-    file.write_text(BALL.format(receiver=receiver))
-    return load_scene(file)
+    return load(tmp_path, BALL.format(receiver=receiver))
 
 
 def done(gl, scene: Scene, receiver: str, path: Path) -> tuple[np.ndarray, dict]:

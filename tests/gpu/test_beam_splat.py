@@ -53,8 +53,9 @@ def errors(rig: BeamRig, one: BeamPolygons) -> tuple[float, float, float]:
     return float(np.abs(apart).max() / reference.max()), float(rms), float(image.sum() / reference.sum() - 1.0)
 
 
-@pytest.mark.parametrize("motion", [0.1, 6.0, 24.0])
-@pytest.mark.parametrize("size", [0.3, 1.0, 12.0, 30.0])
+@pytest.mark.parametrize(
+    ("size", "motion"), [(0.3, 0.1), (0.3, 24.0), (1.0, 6.0), (12.0, 0.1), (12.0, 24.0), (30.0, 6.0)]
+)
 def test_swept_polygons_match_single_indices(rig: BeamRig, size: float, motion: float) -> None:
     rng = np.random.default_rng(int(100 * size + motion))
     found = np.array([errors(rig, moving(rng, size, motion)) for _ in range(6)])

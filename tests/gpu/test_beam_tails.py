@@ -13,7 +13,6 @@ import pytest
 from scipy.spatial import ConvexHull
 from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.geometry.primitives import plane
-from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.spectrum import illuminant
@@ -24,6 +23,8 @@ from spectrasplat.render import pass_rounds
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.light_pass import LightPass
 from spectrasplat.render.photon_records import NoRecords, RoundOf
+
+from tests.unit.scene_texts import load
 
 PHOTONS = 60_000
 # Seven times as large as what GPU space holds as it is.
@@ -89,9 +90,7 @@ def scene_of(mesh: Mesh) -> Scene:
 
 
 def stone(folder: Path, light: str = BEAM, spectrum: str = '"D65"', more: str = "") -> Scene:
-    file = folder / "stone.toml"
-    file.write_text(STONE.format(light=light, spectrum=spectrum, more=more))
-    return load_scene(file)
+    return load(folder, STONE.format(light=light, spectrum=spectrum, more=more))
 
 
 class _Counted(NoRecords):
@@ -221,8 +220,7 @@ def test_beams_that_are_cut_to_nothing_are_left_to_photons(gl, tmp_path: Path) -
     """A lamp over a tank as wide as the scene: rays through its one facet are so far from parallel that hardly any
     piece of it is followed down to the table. A slab of water over the table's light keeps its beams."""
     for height, middle, by_beams in ((5.0, 1.0, False), (0.1, 3.0, True)):
-        (tmp_path / "tank.toml").write_text(TANK.format(height=height, middle=middle))
-        with passed(gl, load_scene(tmp_path / "tank.toml"), photons=2000) as light:
+        with passed(gl, load(tmp_path, TANK.format(height=height, middle=middle)), photons=2000) as light:
             assert (light.survey.beams is not None) == by_beams, light.survey.beam_light.why_not
             assert by_beams or "cut into so many" in light.survey.beam_light.why_not
 

@@ -71,12 +71,10 @@ def covered(gl, objects: list[SceneObject]) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "sky", "bands"),
     [
-        ("ball", "map", 1),
         ("ball", "background", 4),
         ("prism", "background", 1),
         ("coated", "map", 4),
         ("slab", "background", 4),
-        ("brilliant", "map", 4),
         ("brilliant", "background", 1),
         ("nested", "background", 1),
     ],

@@ -7,7 +7,6 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from spectrasplat.gpu.context import Context
-from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics import glass
 from spectrasplat.model.optics.colorimetry import VISIBLE_NM, cmf_xyz
 from spectrasplat.model.optics.spectrum import illuminant
@@ -15,6 +14,8 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import pilot
 from spectrasplat.render.device_scene import scene_buffers
 from spectrasplat.render.light_pass import LightPass
+
+from tests.unit.scene_texts import load
 
 SCENE = """
 camera = { position = [0.0, -6.0, 6.0], target = [0.0, 0.0, -1.2], vertical_fov_deg = 12.0 }
@@ -39,8 +40,7 @@ def landing(height: np.ndarray, index: np.ndarray) -> np.ndarray:
 def test_chords_of_a_ball_keep_the_bound_in_each_channel(
     gl: Context, tmp_path, monkeypatch: pytest.MonkeyPatch, V_d: float, photons: int
 ) -> None:
-    (tmp_path / "ball.toml").write_text(SCENE % V_d)
-    scene, settings = load_scene(tmp_path / "ball.toml"), RenderSettings(160, 90, method="srd-photons", layer="caustic")
+    scene, settings = load(tmp_path, SCENE % V_d), RenderSettings(160, 90, method="srd-photons", layer="caustic")
     fits: list[pilot.PilotFit] = []
     counted: Callable[[pilot.PilotFit], int] = pilot.PilotFit.band_count
     monkeypatch.setattr(pilot.PilotFit, "band_count", lambda fit: (fits.append(fit), counted(fit))[1])

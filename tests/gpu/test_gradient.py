@@ -13,13 +13,14 @@ from spectrasplat.base.errors import UserError
 from spectrasplat.base.generators import finished
 from spectrasplat.edit.glass import bent
 from spectrasplat.edit.parameters import Stage
-from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.catalogue import find
 from spectrasplat.model.optics.glass import with_gain
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.frames import FrameRenderer
 from spectrasplat.render.gradient import Gradient, gradient, sides
+
+from tests.unit.scene_texts import load
 
 BALL = """
 [[lights]]
@@ -71,8 +72,7 @@ def relative(found: np.ndarray, expected: np.ndarray, blur: float) -> float:
 
 
 def loaded(tmp_path: Path) -> Scene:
-    (tmp_path / "ball.toml").write_text(BALL)
-    return load_scene(tmp_path / "ball.toml")
+    return load(tmp_path, BALL)
 
 
 @pytest.mark.parametrize("path", ["objects.ball.n_d", "objects.ball.position.x"])

@@ -13,6 +13,8 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
+from tests.unit.scene_texts import load
+
 SCENE = """
 [camera]
 position = [0.0, -2.6, 6.9]
@@ -96,9 +98,7 @@ def test_penumbrae_of_halved_beams_are_the_lamp_s(gl, tmp_path: Path) -> None:
     """Beams are cut in halves where density or absorption is not straight, along directions that every point of the
     lamp throws elsewhere. That is no edge: taken for one, its penumbra was three times as wide as the others, and
     narrow halves were blurred by it all round. Off in blocks of 4 x 4 pixels by 0.08 to 0.13, now by 0.005."""
-    path = tmp_path / "block.toml"
-    path.write_text(BLOCK)
-    scene, weights = load_scene(path), np.array([0.2126, 0.7152, 0.0722])
+    scene, weights = load(tmp_path, BLOCK), np.array([0.2126, 0.7152, 0.0722])
     settings = RenderSettings(width=64, height=36, layer="caustic", photons=100_000, spp=16)
     picture = render(scene, settings, context=gl).rgb @ weights
     reference = cached_reference(scene, 64, 36, photons=700_000).xyz[..., 1]

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.still import render
+
+from tests.unit.scene_texts import load
 
 SCENE = """
 [camera]
@@ -38,9 +39,8 @@ material = "diffuse"
 """
 
 
-@pytest.mark.parametrize("other", ["box", "sphere"])
 @pytest.mark.parametrize(
-    ("shape", "extent"), [("disc", "radius = 0.1"), ("rectangle", "size = [0.2, 0.2]")], ids=["disc", "rectangle"]
+    ("shape", "extent", "other"), [("disc", "radius = 0.1", "box"), ("rectangle", "size = [0.2, 0.2]", "sphere")]
 )
 def test_a_beam_between_two_solids_lights_the_table_alone(
     gl, tmp_path: Path, shape: str, extent: str, other: str
@@ -48,9 +48,9 @@ def test_a_beam_between_two_solids_lights_the_table_alone(
     """Before: a traceback. No part of the emission's rectangle was on glass, and its share of it was divided by."""
     found = {}
     for x in (0.0, -1.5):
-        path = tmp_path / "scene.toml"
-        path.write_text(SCENE.format(shape=shape, extent=extent, other=other, x=x))
         settings = RenderSettings(64, 36, layer="caustic", photons=4000)
-        found[x] = render(load_scene(path), settings, context=gl)
+        found[x] = render(
+            load(tmp_path, SCENE.format(shape=shape, extent=extent, other=other, x=x)), settings, context=gl
+        )
     assert found[0.0].stats.photons == 0 and not np.any(found[0.0].rgb)
     assert found[-1.5].rgb.sum() > 0.0

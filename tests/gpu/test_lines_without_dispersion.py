@@ -11,6 +11,8 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
 
+from tests.unit.scene_texts import load
+
 SCENE = """
 [camera]
 position = [-0.5, -2.7, 6.9]
@@ -48,9 +50,7 @@ WIDE = 'target = [0.0, 0.0, 0.3]\nshape = "rectangle"\nsize = [0.57, 0.71]\nflux
 def test_all_lines_of_a_lamp_are_drawn(gl, tmp_path: Path, tint: str, kind: str, lamp: str) -> None:
     """What beams left to photons had no band of the spectral tables, and ended in a traceback; now the strongest line's
     stand for all. Each channel of the light in all is within 1 %."""
-    path = tmp_path / "scene.toml"
-    path.write_text(SCENE.format(kind=kind, lamp=lamp, tint=tint, height=0.2))
-    scene = load_scene(path)
+    scene = load(tmp_path, SCENE.format(kind=kind, lamp=lamp, tint=tint, height=0.2))
     settings = RenderSettings(96, 54, layer="caustic", photons=60_000)
     picture = render(scene, settings, context=gl).rgb.astype(float).sum(axis=(0, 1))
     xyz = cached_reference(scene, 96, 54, photons=400_000).xyz.sum(axis=(0, 1))

@@ -107,8 +107,7 @@ PERSPECTIVE = np.array([[70.0, 9.0, 0.0, 900.0], [-6.0, 60.0, 0.0, 700.0], [0.3,
 """Of a plane seen aslant: texels grow to 40 times their area across the map."""
 
 
-@pytest.mark.parametrize("motion", [0.0, 6.0])
-@pytest.mark.parametrize("size", [1.0, 12.0, 60.0])
+@pytest.mark.parametrize(("size", "motion"), [(1.0, 0.0), (12.0, 6.0), (60.0, 0.0), (60.0, 6.0)])
 def test_swept_polygons_in_perspective(gl, size: float, motion: float) -> None:
     """Against points of every texel, each with its own area on the receiver; the largest goes behind the camera."""
     rig = BeamRig(gl.ctx)

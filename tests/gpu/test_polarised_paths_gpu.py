@@ -39,10 +39,10 @@ def mirrored() -> tuple[SceneObject, ...]:
 
 
 CASES = {
-    "stone": Case(stone, depth=5, refractions=2, tinted=False, lattice=120, polarisation=True, compared=60),
+    "stone": Case(stone, depth=5, refractions=2, tinted=False, lattice=120, polarisation=True, compared=30),
     "touching glass": Case(touching, refractions=3, lattice=200, polarisation=True),
     "panes with a mirror between": Case(
-        mirrored, depth=5, refractions=4, tinted=False, lattice=400, polarisation=True, compared=60
+        mirrored, depth=5, refractions=4, tinted=False, lattice=400, polarisation=True, compared=30
     ),
     "curved": Case(
         lambda: (ball(glass("N-SF11"), (0.0, 0.6, 0.0), 0.8), ball(Mirror((0.9, 0.9, 0.9)), (0.3, -0.9, 0.1), 0.6)),
@@ -50,7 +50,7 @@ CASES = {
         tinted=False,
         lattice=120,
         polarisation=True,
-        compared=60,
+        compared=30,
     ),
 }
 

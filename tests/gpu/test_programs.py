@@ -38,7 +38,10 @@ _small: set[tuple[str, ...]] = set()
 """Texts whose size was."""
 
 
-@pytest.fixture(scope="module", params=["as here", "as on a GPU", "as on one without a rasteriser"])
+@pytest.fixture(
+    scope="module",
+    params=[pytest.param("as here", marks=pytest.mark.slow), "as on a GPU", "as on one without a rasteriser"],
+)
 def device(request: pytest.FixtureRequest) -> Iterator[Context]:
     """The driver that is there, given its own programs or those that a GPU gets. Float atomics are NVIDIA's and not of
     the book: compute shaders that add splats compare and swap."""

@@ -206,9 +206,9 @@ def test_light_without_colours_says_nothing() -> None:
     )
     target, between = light_of(scene, "wall", seed=3)
     with pytest.raises(ss.UserError, match="says nothing about a glass"):
-        ss.match(scene, "plate", "wall", target, between, photons=20_000)
+        ss.match(scene, "plate", "wall", target, between, photons=4_000)
     dark = np.add(between, [0.0, 0.3, 0.0]).tolist()
     with pytest.raises(ss.UserError, match="no glass of the catalogue casts such light"):
-        ss.match(scene, "plate", "wall", target, dark, photons=20_000)
+        ss.match(scene, "plate", "wall", target, dark, photons=4_000)
     with pytest.raises(ss.UserError, match=r"'objects.plate.n_d' changes no light there"):
-        ss.fit(scene, ["objects.plate.n_d"], "wall", target, dark, photons=20_000)
+        ss.fit(scene, ["objects.plate.n_d"], "wall", target, dark, photons=4_000)

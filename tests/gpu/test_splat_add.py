@@ -170,7 +170,14 @@ def agree(gl: Context, case: str, count: int = 300, most: float = 3e-4) -> None:
         assert off.sum() <= 2 + 0.02 * np.count_nonzero(want[..., 1]), record
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    ("adding", "case"),
+    [
+        *(("compare and swap", case) for case in CASES),
+        *(("float atomics", case) for case in ("small", "swept in bins")),
+    ],
+    indirect=["adding"],
+)
 @pytest.mark.usefixtures("adding")
 def test_every_kind_is_added_as_it_is_drawn(gl: Context, case: str) -> None:
     agree(gl, case)

@@ -10,13 +10,14 @@ import pytest
 from spectrasplat.features.features import Features
 from spectrasplat.gpu.context import Context
 from spectrasplat.gpu.scene_buffers import SceneBuffers
-from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.model.tint_levels import LEVELS
 from spectrasplat.render.device_scene import spectral_axis
 from spectrasplat.render.light_pass import LightPass
+
+from tests.unit.scene_texts import load
 
 SLAB = """
 [camera]
@@ -43,9 +44,7 @@ WINE, GREEN, DARK = [0.85, 0.16, 0.20], [0.2, 0.7, 0.3], [0.02, 0.05, 0.01]
 
 
 def scene_of(tmp_path: Path, colour: list[float], thickness: float, side: float = 2.2) -> Scene:
-    file = tmp_path / "scene.toml"
-    file.write_text(SLAB.format(colour=colour, thickness=thickness, side=side))
-    return load_scene(file)
+    return load(tmp_path, SLAB.format(colour=colour, thickness=thickness, side=side))
 
 
 def settings_of(method: str = "srd-photons", bins: int | None = None) -> RenderSettings:
@@ -80,8 +79,7 @@ def let_through(scene: Scene, thickness: float) -> np.ndarray:
     return (spectrum.density * share) @ weights * 100.0 / (K_M * spectrum.density @ cmf_xyz()[:, 1])
 
 
-@pytest.mark.parametrize("thickness", [0.2, 1.0, 2.5])
-@pytest.mark.parametrize("colour", [WINE, GREEN], ids=["wine", "green"])
+@pytest.mark.parametrize(("colour", "thickness"), [(WINE, 0.2), (GREEN, 1.0), (WINE, 2.5)])
 def test_one_band_has_the_colour_of_a_plate(gl, tmp_path: Path, colour: list[float], thickness: float) -> None:
     scene = scene_of(tmp_path, colour, thickness)
     truth, shone = let_through(scene, thickness), let_through(scene, 0.0)

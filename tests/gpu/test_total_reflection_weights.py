@@ -19,6 +19,7 @@ from spectrasplat.passes import pilot
 from spectrasplat.render.still import render
 
 from tests.gpu.test_beam_tails import passed
+from tests.unit.scene_texts import load
 
 SEEDS = (1, 2, 3)
 
@@ -48,8 +49,7 @@ def test_a_bubble_in_a_block_glows_about_as_much_with_one_band_as_with_twelve(
 ) -> None:
     """At the table's rim: believed up to a radian, columns take 9 % of its light to where none goes; 5 % are missing
     for weights that are straight over a band (docs/limits.md). Noise is 1 %."""
-    (tmp_path / "bubble.toml").write_text(BUBBLE)
-    scene, rim = load_scene(tmp_path / "bubble.toml"), []
+    scene, rim = load(tmp_path, BUBBLE), []
     for bands in (1, 12):
         monkeypatch.setattr(pilot.PilotFit, "band_count", lambda fit, bands=bands: bands)
         with passed(gl, scene, "srd-photons", photons=150_000) as light:

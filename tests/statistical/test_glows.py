@@ -16,11 +16,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.gpu.context import Context
-from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.photon_reference import cached_reference
 from spectrasplat.render.still import render
+
+from tests.unit.scene_texts import load
 
 WIDTH, HEIGHT, BLOCK = 96, 54, 6
 TABLE = """
@@ -91,9 +92,7 @@ rests_at_z = 0.2159
 
 
 def loaded(text: str, folder: Path) -> Scene:
-    path = folder / "scene.toml"
-    path.write_text(text)
-    return load_scene(path)
+    return load(folder, text)
 
 
 def blocks(picture: np.ndarray) -> np.ndarray:

@@ -245,7 +245,11 @@ def reference(gl) -> tuple[np.ndarray, np.ndarray, Window]:
 
 @pytest.mark.parametrize(
     "method",
-    ["stochastic-point", "stochastic", "stochastic-even", "progressive-stochastic", "srd-photons", "progressive"],
+    ["stochastic-point", "srd-photons", "progressive"]
+    + [
+        pytest.param(name, marks=pytest.mark.slow)
+        for name in ("stochastic", "stochastic-even", "progressive-stochastic")
+    ],
 )
 def test_maps_are_the_histogram_of_random_photons(
     gl, reference: tuple[np.ndarray, np.ndarray, Window], method: str

@@ -22,6 +22,8 @@ from spectrasplat.model.optics.spectral_tables import SpectralAxis
 from spectrasplat.stress.cases.chains import kept as books_of
 from spectrasplat.stress.rigs.gpu_paths import beam_light, extruded, glass, placed
 
+from tests.unit.scene_texts import load
+
 BK7 = glass("N-BK7")
 
 
@@ -99,8 +101,7 @@ material = "diffuse"
 @pytest.mark.parametrize("kind", ["point", "spot"])
 def test_light_that_is_caught_in_a_tinted_pane_ends_finite(tmp_path: Path, kind: str) -> None:
     """What is absorbed to 1e-320 in the middle of its band had an infinite slope: NaN round a blue window pane."""
-    (tmp_path / "pane.toml").write_text(PANE.format(kind=kind))
-    scene = load_scene(tmp_path / "pane.toml")
+    scene = load(tmp_path, PANE.format(kind=kind))
     meshes = [o.mesh.transformed(o.object_to_world) for o in scene.objects]
     axis = SpectralAxis.build([scene.objects[0].material.dispersion])
     beams = beam_scene(scene, meshes, {0: (np.zeros(3), np.eye(3)[:2])}, axis, 1.0)

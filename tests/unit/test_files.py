@@ -18,6 +18,8 @@ from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.lights.ies_file import read_ies
 from spectrasplat.model.optics.spectrum import from_csv
 
+from tests.unit.scene_texts import load
+
 SECRET = "xyzzy:0:0:plugh horse battery"
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 SCENE = '[[objects]]\nmesh = "{}"\nglass = "N-BK7"\n'
@@ -57,10 +59,8 @@ def test_longer_files_are_refused_before_they_are_read(tmp_path: Path) -> None:
 def test_names_that_no_file_can_have_are_one_sentence(tmp_path: Path, name: str) -> None:
     with pytest.raises(UserError):
         load_scene(tmp_path / name)
-    scene = tmp_path / "scene.toml"
-    scene.write_text(SCENE.format(name.replace("\0", "\\u0000").replace(".toml", ".obj")))
     with pytest.raises(UserError, match="not a file"):
-        load_scene(scene)
+        load(tmp_path, SCENE.format(name.replace("\0", "\\u0000").replace(".toml", ".obj")))
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Diffuse, Material, Scene
 
 from tests.unit.gltf_builder import FACES, POSITIONS, Builder, glass_material
+from tests.unit.scene_texts import load
 
 CLOSED, OPEN = FACES, FACES[:1]
 RED = (1.0, 0.2, 0.2)
@@ -207,8 +208,7 @@ def test_a_scene_file_makes_sheets(tmp_path: Path) -> None:
     assert pane.thin and pane.transmittance_rgb == RED and "thin" in pane.words() and not pane.is_rough
     assert [note for note in scene.notes if "'pane'" in note] == ["'pane': roughness has no effect in a thin sheet"]
     assert pane.values()["thin"] is True and pane.values()["colour"] == [*RED]
-    (tmp_path / "s.toml").write_text(table.replace("thin = true", ""))
-    assert any("thin = true" in note for note in load_scene(tmp_path / "s.toml").notes)
+    assert any("thin = true" in note for note in load(tmp_path, table.replace("thin = true", "")).notes)
 
 
 # -- compressed meshes --------------------------------------------------------------------

@@ -24,6 +24,8 @@ from spectrasplat.model.lights.ies_file import Profile, read_ies
 from spectrasplat.model.optics.spectrum import constant
 from spectrasplat.model.scene import Scene
 
+from tests.unit.scene_texts import load
+
 ONE = constant(1.0)
 
 
@@ -210,9 +212,7 @@ position = [0, 0, -1]
 
 def scene(tmp_path: Path, more: str = "", text: str | None = None) -> Scene:
     (tmp_path / "lamp.ies").write_text(text or lopsided(), encoding="ascii")
-    path = tmp_path / "scene.toml"
-    path.write_text(SCENE.format(more=more), encoding="utf-8")
-    return load_scene(path)
+    return load(tmp_path, SCENE.format(more=more))
 
 
 def test_its_power_is_the_files_own_or_what_lumens_says(tmp_path: Path) -> None:
@@ -239,9 +239,8 @@ def test_bad_keys(tmp_path: Path, more: str, told: str) -> None:
 def test_a_bad_file_is_blamed_on_its_key(tmp_path: Path) -> None:
     with pytest.raises(UserError, match=r"scene.toml: lights\[0\].file cannot be used: .*lamp.ies has no line TILT="):
         scene(tmp_path, text="nothing")
-    (tmp_path / "scene.toml").write_text(SCENE.format(more="").replace("lamp.ies", "none.ies"), encoding="utf-8")
     with pytest.raises(UserError, match=r"lights\[0\].file names .*none.ies, which is not a file"):
-        load_scene(tmp_path / "scene.toml")
+        load(tmp_path, SCENE.format(more="").replace("lamp.ies", "none.ies"))
 
 
 @pytest.mark.parametrize("more", ["", "rotation_deg = 70\ntangent = [0, 0.8, 0.6]\nlumens = 800"])

@@ -17,6 +17,8 @@ from spectrasplat.gpu.texture_store import _sources
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.scene import Scene
 
+from tests.unit.scene_texts import load
+
 SCENE = """
 [[objects]]
 name = "gem"
@@ -46,9 +48,7 @@ LAMP = (
 
 
 def scene(tmp_path: Path, light: str = LAMP) -> Scene:
-    path = tmp_path / "scene.toml"
-    path.write_text(SCENE.format(light=light))
-    return load_scene(path)
+    return load(tmp_path, SCENE.format(light=light))
 
 
 def said(value: Scene) -> str:

@@ -24,6 +24,8 @@ from spectrasplat.model.scene_key import scene_key
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.reference.photon_reference import render_reference
 
+from tests.unit.scene_texts import load
+
 SCENE = """
 name = "lens"
 [camera]
@@ -51,9 +53,7 @@ material = { kind = "diffuse", colour = 0.5 }
 
 
 def scene_of(folder: Path, lens: str = "") -> Scene:
-    path = folder / "scene.toml"
-    path.write_text(SCENE.replace("LENS", lens), encoding="utf-8")
-    return load_scene(path)
+    return load(folder, SCENE.replace("LENS", lens))
 
 
 @pytest.mark.parametrize("suffix", ["toml", "glb"])

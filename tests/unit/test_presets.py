@@ -19,6 +19,8 @@ from spectrasplat.model.optics.tints import half_distance, tint, tint_of, tints
 from spectrasplat.model.scene import Dielectric, Scene
 from spectrasplat.model.staging import Staging
 
+from tests.unit.scene_texts import load
+
 PRISM = assets_dir() / "scenes" / "prism.toml"
 
 
@@ -70,9 +72,8 @@ def test_a_tint_that_is_not_there_is_told(tmp_path: Path) -> None:
     text = PRISM.read_text().replace(
         'glass = "N-SF11"', 'material = { glass = "N-SF11", absorption = { tint = "ambre", distance = 1 } }'
     )
-    (tmp_path / "a.toml").write_text(text)
     with pytest.raises(UserError, match="did you mean 'amber'"):
-        load_scene(tmp_path / "a.toml")
+        load(tmp_path, text)
 
 
 def test_presets_and_staging_know_the_names_and_fit_the_depth() -> None:

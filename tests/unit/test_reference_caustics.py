@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from spectrasplat.edit.chromaticity import colour_info
 from spectrasplat.model.geometry import primitives
-from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.lights import CollimatedLight
 from spectrasplat.model.optics.spectrum import Spectrum, illuminant, laser
 from spectrasplat.model.scene import Camera, Dielectric, Scene
@@ -26,6 +25,7 @@ from spectrasplat.reference.rounds import PARTS, TALLY_SIZE, summed
 from spectrasplat.reference.spectral_caustic import CausticPlan, CausticRun, build_caustic
 
 from tests.unit.camera_scenes import D65, FLINT, place, plate, scene_of
+from tests.unit.scene_texts import load
 
 SIZE = 24, 16
 PLAN = CausticPlan(photons=1 << 17, bins=12)
@@ -247,9 +247,7 @@ position = [8, 0, 1]
 
 @pytest.fixture
 def lit(tmp_path: Path):
-    path = tmp_path / "lit.toml"
-    path.write_text(LIT)
-    return load_scene(path)
+    return load(tmp_path, LIT)
 
 
 def luxes(lit, place, normal=(0.0, 0.0, 1.0)) -> np.ndarray:

@@ -18,6 +18,8 @@ from spectrasplat.model.io.scene_save import save_scene
 from spectrasplat.model.scene import Diffuse, Scene
 from spectrasplat.model.texture import Environment, Texture
 
+from tests.unit.scene_texts import load
+
 BALL = '[[objects]]\nshape = "sphere"\nglass = "N-SF11"\n'
 TABLE = '[[objects]]\nname = "table"\nshape = "plane"\nwidth = 9.0\nheight = 9.0\nposition = [0, 0, -2]\n'
 CAMERA = "[camera]\nposition = [0, -6, 3]\ntarget = [0, 0, 0]\n"
@@ -33,11 +35,6 @@ def folder(tmp_path: Path) -> Path:
     (tmp_path / "bare.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     (tmp_path / "mapped.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n")
     return tmp_path
-
-
-def load(folder: Path, text: str) -> Scene:
-    (folder / "scene.toml").write_text(text, encoding="utf-8")
-    return load_scene(folder / "scene.toml")
 
 
 def refusal(folder: Path, text: str) -> str:
