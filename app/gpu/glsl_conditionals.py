@@ -6,8 +6,9 @@ Where only the driver knows (GL_*, __VERSION__, names that are not defined) noth
 
 from __future__ import annotations
 
+import operator as op
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -15,26 +16,17 @@ _DIRECTIVE = re.compile(r"\s*#\s*(\w+)\s*(.*)", re.DOTALL)
 DEFINE = re.compile(r"(\w+)(\([^)]*\))?\s*(.*)", re.DOTALL)
 """Name, arguments and body of what follows #define."""
 _CONDITION_TOKEN = re.compile(r"\s*(0[xX][0-9a-fA-F]+|\d+|\w+|&&|\|\||[=!<>]=|<<|>>|[-+*/%<>!()])[uU]?")
-_LEVELS = (("||",), ("&&",), ("==", "!="), ("<", ">", "<=", ">="), ("<<", ">>"), ("+", "-"), ("*", "/", "%"))
-_OPERATIONS = {
-    "||": lambda a, b: int(bool(a or b)),
-    "&&": lambda a, b: int(bool(a and b)),
-    "==": lambda a, b: int(a == b),
-    "!=": lambda a, b: int(a != b),
-    "<": lambda a, b: int(a < b),
-    ">": lambda a, b: int(a > b),
-    "<=": lambda a, b: int(a <= b),
-    ">=": lambda a, b: int(a >= b),
-    "<<": lambda a, b: a << b,
-    ">>": lambda a, b: a >> b,
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a // b,
-    "%": lambda a, b: a % b,
-}
-
-
+_LEVELS: tuple[dict[str, Callable[[int, int], int]], ...] = (
+    {"||": lambda a, b: bool(a or b)},
+    {"&&": lambda a, b: bool(a and b)},
+    {"==": op.eq, "!=": op.ne},
+    {"<=": op.le, ">=": op.ge, "<": op.lt, ">": op.gt},
+    {"<<": op.lshift, ">>": op.rshift},
+    {"+": op.add, "-": op.sub},
+    {"*": op.mul, "/": op.floordiv, "%": op.mod},
+)
+"""Operations of two operands, those first that bind least."""
+COMPARISONS = _LEVELS[2] | _LEVELS[3]
 _DEEPEST = 8
 """Macros in macros that a condition may go through."""
 
@@ -188,10 +180,10 @@ def _expression(tokens: list[str], macros: _Macros, level: int, depth: int = 0) 
         return _operand(tokens, macros, depth)
     value = _expression(tokens, macros, level + 1, depth)
     while tokens and tokens[0] in _LEVELS[level]:
-        operation = _OPERATIONS[tokens.pop(0)]
+        operation = _LEVELS[level][tokens.pop(0)]
         right = _expression(tokens, macros, level + 1, depth)
         try:
-            value = operation(value, right)
+            value = int(operation(value, right))
         except (ZeroDivisionError, ValueError) as error:
             raise _UnknownError from error
     return value

@@ -10,13 +10,16 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+from .glsl_conditionals import COMPARISONS
+
 _BRACKET = re.compile(r"[(){}\[\]]")
 _DECLARED = re.compile(r"(?:const\s+)?([A-Za-z_]\w*)\s+([A-Za-z_]\w*)\s*(?:[=;,]|\[)")
 _DECLARATION_OF_MORE = re.compile(r",\s*([A-Za-z_]\w*)\s*(?==|,|;|\[)")
 _KEYWORDS = frozenset({"return", "else", "case"})
-_COMPARISON = r"\s*(?:==|!=|<=|>=|<|>)\s*\d+[uU]?"
+_SIGN = "|".join(COMPARISONS)
+_COMPARISON = rf"\s*(?:{_SIGN})\s*\d+[uU]?"
 _NUMBER = re.compile(r"\d+[uU]?")
-_CONSTANT = re.compile(r"(!?)\s*(\w+)\s*(?:(==|!=|<=|>=|<|>)\s*(\w+))?")
+_CONSTANT = re.compile(rf"(!?)\s*(\w+)\s*(?:({_SIGN})\s*(\w+))?")
 
 
 def places_of(values: Mapping[str, int], switches: frozenset[str]) -> re.Pattern[str] | None:
@@ -140,17 +143,7 @@ def _decided(text: str, values: Mapping[str, int]) -> bool | str:
     left_value, right_value = _value(name, values), _value(other, values) if other else 0
     if left_value is None or right_value is None or _NUMBER.fullmatch(text):
         return text
-    return _COMPARED[comparison or "!="](left_value, right_value)
-
-
-_COMPARED = {
-    "==": lambda a, b: a == b,
-    "!=": lambda a, b: a != b,
-    "<=": lambda a, b: a <= b,
-    ">=": lambda a, b: a >= b,
-    "<": lambda a, b: a < b,
-    ">": lambda a, b: a > b,
-}
+    return bool(COMPARISONS[comparison or "!="](left_value, right_value))
 
 
 def _value(word: str, values: Mapping[str, int]) -> int | None:
