@@ -44,8 +44,8 @@ from .search import (
 _GRAZING = 1e-9
 """Squared cosines of transmission smaller than this may have either sign: total reflection is just setting in."""
 _FADES = 0.3
-"""Of the shares that pass a facet at the places of a band, the least by the most: below, rays that diverge are far from
-affine there, and from one place of the band to the next. The share rises as the root of the way from the onset."""
+"""Least over greatest share of light that passes a facet within a band: below, rays that diverge are far from affine
+there, and from one place of the band to the next. The share rises as the root of the way from the onset."""
 
 
 @part

@@ -29,7 +29,7 @@ FLAG_INSIDE = 4
 FLAG_EXTRAORDINARY = 8
 """In a crystal, the ray is the extraordinary wave."""
 FLAG_OFF_LATTICE = 16
-"""Of a ray: chance has turned it, and its neighbours on the lattice went elsewhere."""
+"""Chance has turned the ray, and its neighbours on the lattice went elsewhere."""
 TINT_BIT = 3
 """From here on, up to the next, a photon's flags are its level (`model.tint_levels`)."""
 LATTICE_BIT = 8

@@ -75,12 +75,12 @@ class Field:
 
     @property
     def base(self) -> str:
-        """Of numpy, of a component."""
+        """numpy's type of a component."""
         return _TYPES[self.type][0]
 
     @property
     def components(self) -> int:
-        """Of a vector; 0: none."""
+        """Components of a vector; 0 for a scalar."""
         return _TYPES[self.type][1] if _TYPES[self.type][1] > 1 else 0
 
     @property
@@ -162,7 +162,7 @@ class Struct:
 
     @cached_property
     def _parts(self) -> list[tuple[int, int, str, str]]:
-        """Of each: how many bits from which on, and the texts of `_FORMS`."""
+        """For each part of a packed record: how many bits from which on, and the texts of `_FORMS`."""
         parts: list[tuple[int, int, str, str]] = []
 
         def add(how: str, bits: int, member: str) -> None:

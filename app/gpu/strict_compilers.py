@@ -32,7 +32,7 @@ _BODY = re.compile(r"\s*(?:[^{;]*;|\{(?:[^{}]|\{[^{}]*\})*\})")
 _LINKED, _REFLECTION = "\nLinked ", "Uniform block reflection:"
 _STAGES = ".comp", ".vert", ".geom", ".frag"
 _NODE = re.compile(r"\d+:(\d+)( +)(.*)")
-"""Of a syntax tree: line, depth, what it is."""
+"""A node of a syntax tree: line, depth, what it is."""
 _QUALIFIED_RECORD = re.compile(r"[^{]*\b(?:restrict|readonly|writeonly|coherent)\b[^{]*\bstructure\{")
 _REFUSED = {
     "Function Call: ": (_QUALIFIED_RECORD, "a record of a qualified block is handed to a function: copy it first"),

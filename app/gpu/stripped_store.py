@@ -40,7 +40,7 @@ def _version() -> bytes:
 
 
 def _key_of(lines: Sequence[Line], switches: frozenset[str]) -> str:
-    """Of these lines, as they came from their files."""
+    """Key of these lines, as they came from their files."""
     digest = hashlib.blake2b(_version(), digest_size=16)
     digest.update(" ".join(sorted(switches)).encode())
     texts, names, numbers = zip(*lines, strict=True)

@@ -96,7 +96,7 @@ class _DeviceTables:
     what has changed at these. Owns what it reads."""
 
     def __init__(self, ctx: moderngl.Context, curves: int, rows: int) -> None:
-        """Of so many `rows` the first are `curves` over wavelength."""
+        """`rows` tables, of which the first `curves` are over wavelength."""
         self._ctx = ctx
         self._held = [np.zeros(0, "f4")] * rows
         self._rows = ctx.buffer(reserve=4 * (KNOTS * curves + SAMPLES * (rows - curves)))

@@ -86,8 +86,8 @@ class LatticeSlice:
         return replace(self, first=self.first + first * self.stride, stride=n * self.stride, points=points)
 
     def row_of(self, n: int, first: int, length: int, smoothing: float) -> LatticeSlice:
-        """Of the `n` even sub-lattices into which rows of neighbours fall, one after the other: one in the middle of
-        the `length` from the `first` on, which stands for all of them."""
+        """One of the `n` even sub-lattices into which rows of neighbours fall, one after the other: the one in the
+        middle of the `length` from the `first` on, which stands for all of these."""
         number, step = self._neighbour(n)
         turns = _wrapped(number * GOLDEN)
         middle = length - 1  # in halves of a step
@@ -144,7 +144,7 @@ def row_of(n: int, first: int, length: int, smoothing: float, parts: Parts) -> P
 
 
 def points_of(parts: Parts) -> int:
-    """Of all of them together."""
+    """Points of all slices together."""
     return sum(piece.points for piece, _ in parts)
 
 

@@ -328,7 +328,7 @@ def meet(a: Window, b: Window) -> Window | None:
 
 
 def known_windows(frame: PlaneFrame, extent: Window, landed: Landings) -> list[Window]:
-    """Of most of the light that landed, and of all of it."""
+    """Windows about most of the light that landed, and about all of it."""
     flat = frame.project(landed.positions)
     everything = meet(grown(extent_of(flat), 0.02), extent) or extent
     return [meet(grown(_quantile_box(flat, landed.flux_w, _QUANTILE), _MARGIN), extent) or everything, everything]

@@ -37,7 +37,7 @@ MORE_PHOTONS = 1.25
 _MAX_ORDERS = 8
 """Emission orders kept, a light: a pass has one for its batches and one for its last, shorter one."""
 _MOST_POINTS = 65535 * _GROUP
-"""Of a slice that is emitted by one dispatch."""
+"""Points of a slice that one dispatch emits, at most."""
 
 
 @dataclass
@@ -260,7 +260,7 @@ class TracePass:
         return some, []
 
     def rounds(self, parts: Parts) -> int:
-        """Of how many points each a batch must take one, so that it holds a part of all whose rays are traced
+        """How many batches share all points evenly between them, so that the rays of each batch are traced
         together."""
         batches: dict[int, float] = {}
         for piece, domain in parts:

@@ -70,9 +70,9 @@ class Drawn:
 
     pictures: list[Picture]
     placement: Mapping[str, object]
-    """Of a map; else empty."""
+    """Where the map lies on its receiver; empty for other layers."""
     window: np.ndarray | None
-    """That holds the same part of a receiver again: see `MapFit.window`."""
+    """`MapFit.window` by which a map holds the same part of its receiver again."""
     photons: int
     notices: list[str]
 

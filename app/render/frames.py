@@ -125,7 +125,7 @@ class FrameRenderer:
         self._fit = FrameFit.of(stages, settings)
         self._unsurveyed = list(stages_to_survey(stages, settings))
         self.window = window
-        """Of a map, once one was rendered."""
+        """Window of the map (`MapFit.window`), once one was rendered."""
         self.traced: Traced | None = None
         """Light and passes of the last frame."""
         self._budget: TimeBudget | None = None

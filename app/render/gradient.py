@@ -35,7 +35,7 @@ ENOUGH, _BANDS = 1 << 17, 16
 """Photons, and their spectral bands, of which fewer have fewer: within one, footprints are as broad as at its middle.
 That misses little of a picture, and much of what dispersion changes in a focus."""
 _OTHER_SEED = 1 << 31
-"""Of the quarter of the photons, over that of all."""
+"""Added to the seed of all photons for the quarter of them."""
 _WORSE, _WORSE_SEEN = 3.0, 5.0**0.5
 """By how many errors of all photons, at least, a quarter of them differs: four times the blur and the chance of a
 lattice, in pictures twice the chance of the camera's samples."""
@@ -43,7 +43,7 @@ lattice, in pictures twice the chance of the camera's samples."""
 
 @dataclass(frozen=True)
 class Derivative:
-    """Of every number of a picture by one parameter, per unit of it."""
+    """Derivative of every number of a picture by one parameter, per unit of it."""
 
     path: str
     picture: Picture
@@ -60,7 +60,7 @@ class Gradient:
     base: Picture
     derivatives: tuple[Derivative, ...]
     placement: Mapping[str, object] | None
-    """Of a map, as `bake` writes it."""
+    """Where the map lies on its receiver, as `bake` writes it; None for other layers."""
 
 
 def gradient(
@@ -73,7 +73,8 @@ def gradient(
     *,
     noise: bool = False,
 ) -> Generator[float, None, Gradient]:
-    """Of what `settings.layer` shows, by each of `paths` (`edit.parameters`, and `INDEX`), pausing with the share done.
+    """Gradient of what `settings.layer` shows by each of `paths` (`edit.parameters`, and `INDEX`), pausing with the
+    share done.
 
     `steps`: of parameters; those of others are found by a few photons. `window`: `MapFit.window` of a map. `noise`: by
     a quarter of the photons and of the camera's samples as well, whose difference says it. Raises `UserError`."""

@@ -23,7 +23,7 @@ from ..passes.pilot import MAX_LIGHT_POINTS, Pilot, PilotFit
 SMALLEST_BATCH = MAX_BANDS * MAX_LIGHT_POINTS
 """One point of every sub-lattice a light may have."""
 CRYSTAL_BANDS = 6
-"""Of light that meets crystals, at least: a wave that part of a band has not is wrong in all of it."""
+"""Bands of light that meets crystals, at least: a wave that only part of a band has is wrong in all of it."""
 SPECTRUM_CELLS = 512
 """Even cells of x in which it is known where each channel's light is."""
 

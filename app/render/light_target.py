@@ -22,15 +22,15 @@ from .bake import drawn
 from .gradient import with_bands
 
 BINS = 16
-"""Of maps that are compared in colour only."""
+"""Spectral bins of maps that are compared in colour only."""
 _TEXELS, _FEWEST = 192, 8
-"""Of a map's longer and shorter side."""
+"""Texels of a map's longer side; at least, of its shorter one."""
 _PARTS = 3
 """Along a side of one cell of a target, between which its mean is taken."""
 _CELLS, _NARROW = 64, 32.0
 """Along a side of a target that is the scene as it is; length of a line over the breadth of its strip."""
 _OFF_PLANE = 1e-4
-"""Of a place that lies in a receiver's plane, over its extent."""
+"""Largest distance from a receiver's plane of a place that lies in it, over its extent."""
 _WIDEST = 0.9
 """Width over the line, at most."""
 
@@ -67,7 +67,7 @@ class Target:
         return np.stack([first, end, last, end + last - first])
 
     def settings(self, settings: RenderSettings) -> RenderSettings:
-        """Of the maps."""
+        """Settings that maps of the target are rendered with."""
         size = np.ptp(self.window @ self.axes.T, axis=0)
         width, height = np.maximum(np.round(_TEXELS * size / size.max()), _FEWEST).astype(int)
         its = replace(

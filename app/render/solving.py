@@ -62,7 +62,7 @@ class Solver:
     context: Context
     stage: Stage
     settings: RenderSettings
-    """Of the rendering."""
+    """Settings of the renderings that are compared."""
     target: Target
     _steps: dict[str, float] = field(default_factory=dict)
     """Found for parameters so far."""
@@ -294,7 +294,7 @@ class Solver:
         return _BLURS if self.target.width is None else (0.0,)
 
     def _errors(self, columns: np.ndarray, wanted: np.ndarray, moves: np.ndarray) -> np.ndarray:
-        """Of `moves` (m, k): see `_errors`; of a width what it differs by, relative."""
+        """Errors of `moves` (m, k), as `_errors` has them; for a width, its relative difference."""
         if self.target.width is None:
             return _errors(columns, wanted, moves)
         found = self._widths(columns, moves)

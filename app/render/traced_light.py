@@ -64,7 +64,8 @@ def _traced_for(light: LightPass, seconds: float, seed: int, stop: Callable[[], 
 
 
 def _seconds_left(stop: Callable[[], bool], ends: float = math.inf) -> Callable[[], float]:
-    """Of a pass that begins now, until `ends` (`time.perf_counter()`), or until soon after `stop()` turned true."""
+    """Seconds left to a pass that begins now, until `ends` (`time.perf_counter()`), or until soon after `stop()` turned
+    true."""
     begun = time.perf_counter()
 
     def left() -> float:

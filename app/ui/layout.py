@@ -48,7 +48,7 @@ BARE = (
     | imgui.WindowFlags_.no_move
     | imgui.WindowFlags_.no_saved_settings
 )
-"""Of windows that stand where the interface puts them."""
+"""Flags of windows that the interface places itself."""
 ON_PICTURE = BARE | imgui.WindowFlags_.no_focus_on_appearing | imgui.WindowFlags_.no_nav
 
 _raised: dict[str, int] = {}

@@ -35,7 +35,7 @@ def data_elements(arrays: Mapping[str, np.ndarray], head: Mapping[str, Any]) -> 
 
 
 def packed_bytes(arrays: Mapping[str, np.ndarray]) -> int:
-    """Of `arrays` in a page's file."""
+    """Bytes that `arrays` take in a page's file."""
     return len(_packed(arrays)[0])
 
 

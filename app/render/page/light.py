@@ -41,7 +41,7 @@ _LIT = 0.8
 _FINER_BEAMS = 4
 """Times as many photons whose time is taken where beams carry all but what is weak."""
 _MOST = 6e4
-"""Of columns: what half floats hold. Longer ones are shortened; where one is no number, light falls on a point."""
+"""Longest column: what half floats hold. Longer ones are shortened; where one is no number, light falls on a point."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class PageLight:
     """By the names of docs/pages.md."""
     head: dict[str, Any]
     frame: PlaneFrame
-    """Of the receiver's plane, GPU space."""
+    """The receiver's plane, GPU space."""
     item: int
     """The receiver in the scene's objects."""
 

@@ -42,7 +42,7 @@ DEFAULT_WIDTH = 720
 MOST_GROUPS = 3
 """Glasses by whose indices a page's photons move, each by its own."""
 MOST_TRIANGLES = 6000
-"""Of all that is drawn of the scene's objects."""
+"""Triangles of all objects that a page draws, at most."""
 _STAYS = (
     "What is seen of the caustic in mirrors and through glass stays as it was rendered, and so does all other light: "
     "only what falls on the receiver follows the controls."
@@ -62,7 +62,7 @@ _FEWER = (
 _ROOM = 7_000_000
 """Bytes that the light of a page of up to `DEFAULT_PHOTONS` may have in its file; of more photons, as many more."""
 _LIGHT_SHARE = 0.5
-"""Of the time, for what is traced to be kept."""
+"""Share of the time for photons that the page keeps."""
 
 
 @dataclass(frozen=True)
@@ -308,8 +308,8 @@ def straight_gains(arrays: Mapping[str, np.ndarray], index: np.ndarray) -> tuple
 
 
 def _spectra(scene: Scene, reflectance: np.ndarray | None) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-    """Of the lights, and of 1 lm each to choose; what the eye sees of a nanometre's light, and that after a receiver's
-    `reflectance` (by nm), linear Rec.709 by rows."""
+    """Spectra of the lights, and those of 1 lm to choose from; what the eye sees of a nanometre's light, and
+    that after a receiver's `reflectance` (by nm), linear Rec.709 by rows."""
     observer = xyz_to_rgb709(K_M * cmf_xyz()).T
     spectra: list[tuple[str, Spectrum, bool]] = [(light.name, light.spectral_power, False) for light in scene.lights]
     spectra += [(name, spectrum.scaled_to_luminous(1.0), True) for name, spectrum in offered_spectra().items()]

@@ -35,7 +35,7 @@ _HELD = 3
 _DEAR = 2.0
 """Times the time there is that the usual photons would take by the newest frame alone: then there are fewer at once."""
 _MAPS_SHARE = 0.25
-"""Of a frame, at most, for what maps cost whatever is in them."""
+"""Largest share of a frame for what maps cost whatever is in them."""
 _PATIENCE = 24
 """Frames between two changes of the maps' size or of depth, which show."""
 
@@ -69,7 +69,7 @@ class FramePlan:
     depth: int = 8
     side: float = 1.0
     known: tuple[Spent, ...] = ()
-    """Of the last frames, newest last."""
+    """What the last frames took, newest last."""
     settled: int = 0
     """Frames since depth or side changed."""
 

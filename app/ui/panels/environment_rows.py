@@ -95,7 +95,7 @@ _ROWS: dict[str, tuple[tuple[str, str, Callable[..., Any], str, str], ...]] = {
         ),
     ),
 }
-"""Of each kind that is made of numbers: parameters, the labels, controls and tooltips of their rows, and the labels of
+"""Parameters of each kind that is made of numbers: the labels, controls and tooltips of their rows, and the labels of
 their edits."""
 
 

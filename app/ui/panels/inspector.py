@@ -196,7 +196,7 @@ def _coat(state: State, index: int, material: Diffuse) -> State:
 
 
 def _films(state: State, index: int) -> State:
-    """Of what metal a mirror is, and what coats it or glass."""
+    """Rows for a mirror's metal, and for what coats it or glass."""
     thing = state.scene.objects[index]
     changed = thing.material
     if changed.is_mirror:
