@@ -1,4 +1,6 @@
-"""Every function of shaders/lib/optics.glsl against its float64 reference, on ordinary and on stiff input."""
+"""Functions of shaders/lib/optics.glsl against their float64 references, on ordinary input. Media that hardly differ,
+grazing incidence and the edge of total reflection: the stress cases of `app/stress/cases/optics.py`, in
+test_stress_cases.py."""
 
 from __future__ import annotations
 
@@ -73,107 +75,6 @@ def test_refraction_away_from_hazards(gl, low: float, high: float) -> None:
     assert relative_error(got["out_dd"], textbook, scale=1.0).max() < 2e-5
 
 
-def test_refraction_invariants(gl) -> None:
-    rng = np.random.default_rng(5)
-    eta = as_f32(rng.uniform(0.4, 1.0, COUNT))
-    e = events()
-    zero = np.zeros((COUNT, 3))
-    deta = np.ones(COUNT)
-    full = evaluate(gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": deta}, {"out_d": "vec3", "out_dd": "vec3"})
-    lengths = 1 + np.linalg.norm(full["out_dd"], axis=-1)
-    assert np.abs(dot(full["out_d"], full["out_dd"]) / lengths).max() < 3e-6
-    assert np.abs(np.linalg.norm(full["out_d"], axis=-1) - 1).max() < 1e-6
-    bend = evaluate(
-        gl.ctx,
-        OPTICS,
-        REFRACT,
-        {**e, "dd": zero, "dn": zero, "eta": eta, "deta": deta},
-        {"out_d": "vec3", "out_dd": "vec3"},
-    )
-    expected = np.linalg.norm(np.cross(e["d"], e["n"]), axis=-1) / -dot(bend["out_d"], e["n"])
-    assert relative_error(np.linalg.norm(bend["out_dd"], axis=-1), expected, scale=0.05).max() < 5e-6
-
-
-def test_equal_indices_change_nothing_at_all(gl) -> None:
-    e = events()
-    got = evaluate(
-        gl.ctx,
-        OPTICS,
-        REFRACT,
-        {**e, "eta": np.ones(COUNT), "deta": np.zeros(COUNT)},
-        {"out_d": "vec3", "out_dd": "vec3"},
-    )
-    np.testing.assert_array_equal(got["out_d"], e["d"])
-    np.testing.assert_array_equal(got["out_dd"], e["dd"])
-
-
-@pytest.mark.parametrize("eta_minus_one", [-1e-6, 1e-6, -1e-4, 1e-4])
-def test_nearly_equal_indices_keep_their_digits(gl, eta_minus_one: float) -> None:
-    # What the two media do to the ray is of the size of eta - 1: judge the change, not the ray.
-    eta = as_f32(np.full(COUNT, 1 + eta_minus_one))
-    e = events(cosine=np.random.default_rng(6).uniform(0.2, 1, COUNT))
-    got = evaluate(
-        gl.ctx,
-        OPTICS,
-        "mu = refraction_mu(t, eta, sqrt(transmitted_cosine2(t, eta)));",
-        {"t": dot(e["d"], e["n"]), "eta": eta},
-        {"mu": "float"},
-    )
-    theta = as_f32(dot(e["d"], e["n"]))
-    omega = np.sqrt((1 - eta) * (1 + eta) + (eta * theta) ** 2)
-    assert relative_error(got["mu"], eta * theta + omega).max() < 1e-6
-    full = evaluate(
-        gl.ctx, OPTICS, REFRACT, {**e, "eta": eta, "deta": np.ones(COUNT)}, {"out_d": "vec3", "out_dd": "vec3"}
-    )
-    want_d, want_dd = cpu_reference_refraction(e, eta, np.ones(COUNT))
-    assert relative_error(full["out_d"], want_d).max() < 3e-7
-    assert relative_error(full["out_dd"], want_dd, scale=1.0).max() < 3e-6
-
-
-@pytest.mark.parametrize("margin_rad", [1e-2, 1e-3, 1e-4, 1e-5, 1e-6])
-def test_near_total_reflection_the_column_loses_no_more_than_the_angle_does(gl, margin_rad: float) -> None:
-    # |∂d'/∂eta| = sin θi / cos θt, and cos² θt is known in float32 to a few eps: the relative error grows as eps /
-    # cos².
-    eta = as_f32(np.full(COUNT, float(index("N-BK7", D_NM))))
-    critical = np.arcsin(1 / eta)
-    e = events(cosine=np.cos(critical - margin_rad))
-    zero = np.zeros((COUNT, 3))
-    inputs = {**e, "dd": zero, "dn": zero, "eta": eta, "deta": np.ones(COUNT)}
-    got = evaluate(
-        gl.ctx, OPTICS, REFRACT + "c2 = cosine2;", inputs, {"out_d": "vec3", "out_dd": "vec3", "c2": "float"}
-    )
-    theta = dot(e["d"], e["n"])
-    cosine2 = (1 - eta) * (1 + eta) + (eta * theta) ** 2
-    assert np.abs(got["c2"] - cosine2).max() < 6 * EPSILON
-    safe = cosine2 > 12 * EPSILON
-    assert safe.any() or margin_rad < 1e-5
-    if safe.any():
-        want = np.sqrt((1 - theta**2) / np.where(safe, cosine2, 1))
-        error = relative_error(np.linalg.norm(got["out_dd"][safe], axis=-1), want[safe])
-        assert (error * cosine2[safe]).max() < 8 * EPSILON
-        assert np.isfinite(got["out_dd"][safe]).all()
-
-
-@pytest.mark.parametrize("angle_deg", [89.0, 89.9, 89.99, 89.999])
-def test_grazing_incidence(gl, angle_deg: float) -> None:
-    eta = as_f32(np.full(COUNT, 1 / float(index("N-BK7", D_NM))))
-    e = events(cosine=np.full(COUNT, np.cos(np.radians(angle_deg))))
-    deta = np.ones(COUNT)
-    body = REFRACT + "reflectance = fresnel_reflectance(theta, eta, cosine2);"
-    got = evaluate(
-        gl.ctx,
-        OPTICS,
-        body,
-        {**e, "eta": eta, "deta": deta},
-        {"out_d": "vec3", "out_dd": "vec3", "reflectance": "float"},
-    )
-    want_d, want_dd = cpu_reference_refraction(e, eta, deta)
-    assert relative_error(got["out_d"], want_d).max() < 1e-6
-    assert relative_error(got["out_dd"], want_dd, scale=1.0).max() < 3e-6
-    expected = fresnel_reflectance(e["d"], e["n"], eta)
-    assert np.abs(got["reflectance"] - expected).max() < 2e-6
-
-
 def test_reflection(gl) -> None:
     e = events()
     body = "float t = dot(d, n); out_d = reflect_direction(d, n, t); out_dd = reflect_column(d, dd, n, dn, t);"
@@ -183,20 +84,6 @@ def test_reflection(gl) -> None:
         relative_error(got["out_dd"], optics.reflect_column(*(e[k] for k in ("d", "dd", "n", "dn"))), scale=1.0).max()
         < 1e-6
     )
-
-
-def test_transfer(gl) -> None:
-    rng = np.random.default_rng(7)
-    e = events(cosine=rng.uniform(0.02, 1, COUNT))
-    dp, distance = as_f32(rng.normal(size=(COUNT, 3))), as_f32(rng.uniform(0, 3, COUNT))
-    got = evaluate(
-        gl.ctx, OPTICS, "q = transfer_column(dp, dd, d, n, t);", {**e, "dp": dp, "t": distance}, {"q": "vec3"}
-    )["q"]
-    want = optics.transfer_column(dp, e["dd"], e["d"], e["n"], distance)
-    size = np.linalg.norm(dp + times(distance, e["dd"]), axis=-1) / np.abs(dot(e["d"], e["n"]))
-    assert relative_error(got, want, scale=size).max() < 3e-6
-    # The result lies in the surface.
-    assert np.abs(dot(got, e["n"]) / size).max() < 1e-6
 
 
 def test_facet_normals_of_slivers_round_like_both_products(gl) -> None:
@@ -272,15 +159,6 @@ def test_fresnel_scalar_and_per_wavelength(gl) -> None:
     bk7 = np.full((4, 3), 1 / float(index("N-BK7", D_NM)))
     known = evaluate(gl.ctx, OPTICS, body, {"d": d, "n": n, "eta": bk7}, {"scalar": "float", "three": "vec3"})["scalar"]
     np.testing.assert_allclose(known, [0.042165, 0.052595, 0.091958, 0.256144], atol=1e-6)
-
-
-def test_total_reflection_is_total(gl) -> None:
-    e = events(cosine=np.random.default_rng(10).uniform(0.01, 0.74, COUNT))
-    eta = np.full(COUNT, 1.5168)  # critical angle 41.2°, cosine 0.752
-    body = "float t = dot(d, n); c2 = transmitted_cosine2(t, eta); r = fresnel_reflectance(t, eta, c2);"
-    got = evaluate(gl.ctx, OPTICS, body, {**e, "eta": eta}, {"c2": "float", "r": "float"})
-    assert (got["c2"] < 0).all()
-    np.testing.assert_array_equal(got["r"], 1.0)
 
 
 def test_numbers_are_told_by_their_bits(gl) -> None:

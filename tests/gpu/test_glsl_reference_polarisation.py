@@ -1,4 +1,5 @@
-"""lib/polarisation.glsl against coherency matrices in float64, and against closed forms of whole paths."""
+"""lib/polarisation.glsl against coherency matrices in float64: bands' ends and gratings. Chains of interfaces are the
+stress case "polarised-chain", in test_stress_cases.py."""
 
 from __future__ import annotations
 
@@ -42,47 +43,6 @@ def test_axes_are_across(gl) -> None:
     np.testing.assert_array_equal(got["s"][:10], got["a"][:10])
     assert np.abs(np.einsum("ij,ij->i", got["s"], n)).max() < 1e-4
     assert not got["q"].any()
-
-
-@pytest.mark.parametrize("event", ["reflection", "transmission", "total", "mirror"])
-def test_an_event_is_that_of_jones_vectors(gl, event: str) -> None:
-    """Into the plane of incidence, through it by complex amplitudes, at three places each with its own state."""
-    rng = np.random.default_rng(5)
-    d = as_f32(optics.unit(rng.normal(size=(COUNT, 3))))
-    angle = as_f32(rng.uniform(-3.0, 3.0, (COUNT, 3)))
-    each = np.stack([states(rng, COUNT) for _ in range(3)], axis=2)  # (COUNT, quv, places)
-    eta = as_f32(rng.uniform(1.2, 1.9, (COUNT, 3)) if event == "total" else rng.uniform(0.4, 1.9, (COUNT, 3)))
-    critical = np.sqrt(np.maximum(1.0 - eta**-2.0, 0.0))
-    share = rng.uniform(0.02, 0.98, (COUNT, 3))
-    theta = -as_f32(critical * share if event == "total" else critical + (1.0 - critical) * share)
-    pairs = {
-        "reflection": "fresnel_reflection(theta, eta, cosine2)",
-        "transmission": "fresnel_transmission(fresnel_reflection(theta, eta, cosine2))",
-        "total": "fresnel_reflection(theta, eta, cosine2)",
-        "mirror": "mirror_reflection()",
-    }
-    body = f"""
-        {ROTATE}
-        vec3 cosine2 = transmitted_cosine2(theta, eta);
-        FresnelPair pair = {pairs[event]};
-        share = polarised_share(seen, pair);
-        Polarisation left = behind_interface(seen, pair);
-        lq = left.q; lu = left.u; lv = left.v;
-    """
-    inputs = {"d": d, "angle": angle, "theta": theta, "eta": eta}
-    inputs |= {name: each[:, i] for i, name in enumerate("quv")}
-    got = evaluate(gl.ctx, LIBRARY, body, inputs, dict.fromkeys(("share", "lq", "lu", "lv"), "vec3"))
-    r_s, r_p, t_s, t_p = polarisation.amplitudes(-theta, eta)
-    ones = np.ones_like(theta)
-    a_s, a_p = {"transmission": (t_s, t_p), "mirror": (-ones, ones)}.get(event, (r_s, r_p))
-    matrix = polarisation.seen_from(polarisation.coherency(np.moveaxis(each, 1, 2)), angle)
-    wanted, stokes = polarisation.stokes_of(polarisation.after(matrix, a_s, a_p))
-    np.testing.assert_allclose(got["share"], wanted, atol=3e-6)
-    found = np.stack([got["lq"], got["lu"], got["lv"]], axis=-1)
-    off = np.abs(found - stokes).max(axis=-1)
-    # Near Brewster's angle next to nothing is left, and its state is rounding's.
-    assert (off * wanted).max() < 2e-5
-    assert np.median(off) < 1e-6
 
 
 def test_ends_of_a_band_are_counted_from_their_own_planes(gl) -> None:
@@ -137,22 +97,3 @@ def test_a_grating_turns_the_field_with_the_ray(gl, reflects: bool) -> None:
     for i, name in enumerate(("lq", "lu", "lv")):
         np.testing.assert_allclose(got[name][plain], stokes[plain][..., i], atol=3e-4)
     np.testing.assert_allclose(got["la"][plain], s[plain], atol=1e-4)
-
-
-def test_fresnels_rhomb_by_shader(gl) -> None:
-    """Two total reflections of 45° each make light at 45° circular [Born and Wolf, 1.5.4]."""
-    n = 1.5168
-    angle = np.linspace(np.radians(42.0), np.radians(50.0), 100001)
-    retardance = 2.0 * np.arctan(np.cos(angle) * np.sqrt(np.sin(angle) ** 2 - n**-2) / np.sin(angle) ** 2)
-    theta = as_f32(np.full(1, -np.cos(angle[np.argmin(np.abs(retardance - np.pi / 4.0))])))
-    body = f"""
-        vec3 cosines = vec3(theta), eta = vec3({n});
-        FresnelPair pair = fresnel_reflection(cosines, eta, transmitted_cosine2(cosines, eta));
-        Polarisation state = Polarisation(vec3(1.0, 0.0, 0.0), vec3(0.0), vec3(1.0), vec3(0.0));
-        state = behind_interface(behind_interface(state, pair), pair);
-        stokes = vec3(state.q.y, state.u.y, abs(state.v.y));
-        share = polarised_share(state, pair);
-    """
-    got = evaluate(gl.ctx, LIBRARY, body, {"theta": theta}, {"stokes": "vec3", "share": "vec3"})
-    np.testing.assert_allclose(got["stokes"][0], [0.0, 0.0, 1.0], atol=3e-4)
-    np.testing.assert_allclose(got["share"], 1.0)

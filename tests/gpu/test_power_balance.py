@@ -54,7 +54,7 @@ def balance(
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total(gl, scene: str) -> None:
-    found = balance(gl, scene)
+    found = balance(gl, scene, photons=20_000)
     assert found.unaccounted < 1e-4
     assert abs(found.drawn) < 1e-4
     assert abs(found.held) < 1e-3

@@ -1,5 +1,5 @@
 """Polarised light of shaders/lib/polarisation.glsl in float64, by Jones vectors: coherency matrices instead of Stokes
-parameters, complex amplitudes instead of their products."""
+parameters."""
 
 from __future__ import annotations
 
@@ -31,17 +31,6 @@ def seen_from(matrix: Array, angle: Array) -> Array:
     c, s = np.cos(angle), np.sin(angle)
     turn = np.stack([np.stack([c, s], -1), np.stack([-s, c], -1)], -2)
     return turn @ matrix @ np.swapaxes(turn, -1, -2)
-
-
-def amplitudes(cosine_i: Array, eta: Array) -> tuple[Array, Array, Array, Array]:
-    """r_s, r_p, and the root of the shares let through for s and p, with r_p = -r_s upright. [Born and Wolf, 1.5.2]"""
-    cosine_t = np.sqrt((1.0 - eta**2 * (1.0 - cosine_i**2)).astype(complex))
-    r_s = (eta * cosine_i - cosine_t) / (eta * cosine_i + cosine_t)
-    r_p = (cosine_i - eta * cosine_t) / (cosine_i + eta * cosine_t)
-    root = np.sqrt(cosine_t.real / (eta * cosine_i))
-    t_s = 2.0 * eta * cosine_i / (eta * cosine_i + cosine_t) * root
-    t_p = 2.0 * eta * cosine_i / (cosine_i + eta * cosine_t) * root
-    return r_s, r_p, t_s, t_p
 
 
 def after(matrix: Array, a_s: Array, a_p: Array) -> Array:

@@ -202,7 +202,7 @@ class Comparison:
         return float(np.mean((excess > 3.0 * np.sqrt(self.variance[..., 1]))[lit]))
 
 
-SLOW = {"wine_glass", "lamp_lit", "nested", "polarised"}
+SLOW = {"mirrored", "wine_glass", "lamp_lit", "nested", "polarised"}
 
 
 @pytest.fixture(
