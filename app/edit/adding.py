@@ -16,6 +16,7 @@ from ..model.scene_checks import check_scene
 from ..model.scene_defaults import bounds_of, environment_of
 from ..model.scene_objects import INLINE, make_shape
 from ..model.scene_objects import SHAPES as ALL_SHAPES
+from ..model.vectors import frozen
 from .names import free_name
 
 SHAPES = tuple(shape for shape in ALL_SHAPES if shape not in ("doublet", "revolution", "height_field", INLINE))
@@ -94,5 +95,4 @@ def _overlap(a: tuple[np.ndarray, np.ndarray] | np.ndarray, b: np.ndarray) -> bo
 def _moved(item: SceneObject, offset: np.ndarray) -> SceneObject:
     matrix = item.object_to_world.copy()
     matrix[:3, 3] += offset
-    matrix.setflags(write=False)
-    return replace(item, object_to_world=matrix)
+    return replace(item, object_to_world=frozen(matrix))

@@ -21,7 +21,7 @@ from ..model.lights.directional import DirectionalLight
 from ..model.scene import Diffuse, Light, Scene, Vec3
 from ..model.scene_defaults import environment_of
 from ..model.texture import Environment, Texture, TextureReader
-from ..model.vectors import vec3
+from ..model.vectors import frozen, vec3
 from . import objects
 from .adding import up_frame
 
@@ -126,9 +126,8 @@ def set_map_intensity(scene: Scene, intensity: float) -> Scene:
         raise UserError(
             f"an intensity of {intensity:g} takes the environment's brightest value out of range; choose a smaller one"
         )
-    rgb.setflags(write=False)
     kept = {"rotation_deg": rotation_deg, "up": list(up)} | dict(now.parameters) | {"intensity": float(intensity)}
-    return replace(scene, environment=replace(now, rgb=rgb, parameters=kept))
+    return replace(scene, environment=replace(now, rgb=frozen(rgb), parameters=kept))
 
 
 def set_environment_lights(scene: Scene, lights: bool) -> Scene:

@@ -16,6 +16,7 @@ from ..model.optics.glass import Dispersion
 from ..model.optics.tints import Tint
 from ..model.scene import Absorption, Dielectric, Scene, Vec3
 from ..model.scene_checks import check_lines
+from ..model.vectors import frozen
 from .objects import changed
 
 _CURVE_NM = np.arange(380.0, 781.0, 4.0)
@@ -88,9 +89,7 @@ def set_tint(scene: Scene, index: int, tint: Tint, distance: float) -> Scene:
     """Colour object `index` so that daylight is half as bright after `distance` scene units."""
     if not (math.isfinite(distance) and distance > 0.0):
         raise UserError(f"{scene.objects[index].name}: the distance of the tint is {distance:g}; give a length above 0")
-    alpha = tint.coefficient / distance
-    alpha.setflags(write=False)
-    return _with_glass(scene, index, absorption=Absorption(alpha))
+    return _with_glass(scene, index, absorption=Absorption(frozen(tint.coefficient / distance)))
 
 
 def set_priority(scene: Scene, index: int, priority: int) -> Scene:

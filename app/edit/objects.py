@@ -17,17 +17,9 @@ import numpy as np
 from ..base.errors import UserError
 from ..model.local_dispersion import MAX_DAB_LOG2
 from ..model.optics import catalogue
-from ..model.scene import (
-    Dab,
-    Dielectric,
-    Diffuse,
-    Material,
-    Mirror,
-    Scene,
-    SceneObject,
-    Vec3,
-)
+from ..model.scene import Dab, Dielectric, Diffuse, Material, Mirror, Scene, SceneObject, Vec3
 from ..model.scene_checks import check_outside, check_scene
+from ..model.vectors import frozen
 from . import matrices
 from .adding import add_object, beside
 from .names import checked_name, free_name
@@ -125,8 +117,7 @@ def set_transform(scene: Scene, index: int, matrix: np.ndarray) -> Scene:
 
     Raises UserError for one that is not finite or flattens the object, and where a light would end up inside its glass.
     """
-    placed = np.array(matrix, dtype=np.float64)
-    placed.setflags(write=False)
+    placed = frozen(np.array(matrix, dtype=np.float64))
     after = changed(scene, index, object_to_world=placed)
     _check_matrix(after.objects[index])
     _check_lights(after, after.objects[index])

@@ -12,11 +12,8 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..model.contacts import world_bounds
-from ..model.scene import (
-    Light,
-    Scene,
-)
-from ..model.vectors import vec3
+from ..model.scene import Light, Scene
+from ..model.vectors import unit, vec3
 from .lights import set_light
 from .matrices import nearest_orthogonal
 from .objects import set_transform
@@ -64,7 +61,7 @@ def light_place(scene: Scene, light: Light) -> np.ndarray:
     chosen = [o for o in scene.objects if o.material.is_specular] or list(scene.objects)
     bounds = np.stack([world_bounds(item) for item in chosen])
     low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
-    return 0.5 * (low + high) - 0.9 * float(np.linalg.norm(high - low)) * _unit(np.asarray(light.direction, float))
+    return 0.5 * (low + high) - 0.9 * float(np.linalg.norm(high - low)) * unit(light.direction)
 
 
 def change(before: np.ndarray, after: np.ndarray, operation: Operation) -> np.ndarray:
@@ -100,9 +97,9 @@ def moved_light(light: Light, delta: np.ndarray) -> Light:
     position = (delta @ np.append(np.asarray(light.position, float), 1.0))[:3]
     moved = light.changed(position=vec3(position)) if light.has_place else light
     if light.has_direction and not np.allclose(linear, np.eye(3), atol=1e-12):
-        moved = moved.changed(direction=vec3(_unit(linear @ axes[:, 2])))
+        moved = moved.changed(direction=vec3(unit(linear @ axes[:, 2])))
         if light.tangent is not None or light.has_roll:
-            moved = moved.changed(tangent=vec3(_unit(linear @ axes[:, 0])))
+            moved = moved.changed(tangent=vec3(unit(linear @ axes[:, 0])))
     # A disc stays round: whichever of its two directions was pulled counts.
     across = stretched[:2][np.argmax(np.abs(np.log(stretched[:2])))]
     return moved.resized(float(across), float(stretched[0]), float(stretched[1]))
@@ -113,7 +110,3 @@ def _nearest_rotation(linear: np.ndarray) -> np.ndarray:
     if np.linalg.det(rotation) < 0.0:
         rotation[:, 2] *= -1.0
     return rotation
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)

@@ -16,7 +16,7 @@ import numpy as np
 from ..base.errors import UserError
 from .placement import frame_from_z, rotation_about
 from .texture import Environment
-from .vectors import Vec3
+from .vectors import Vec3, frozen, vec3
 
 MAX_WIDTH, MAX_HEIGHT = 4096, 2048
 """Largest map kept: 128 MB on the GPU, and a texel is 0.09°."""
@@ -169,21 +169,18 @@ def world_to_local(up: Vec3, rotation_deg: float = 0.0) -> np.ndarray:
     length = float(np.linalg.norm(direction))
     if not (math.isfinite(length) and length > 0.0 and math.isfinite(rotation_deg)):
         raise UserError("environment: up must be a direction other than zero, and rotation_deg a finite number")
-    z = direction / length
-    axis = (float(z[0]), float(z[1]), float(z[2]))
+    axis = vec3(direction / length)
     frame = frame_from_z(axis, (1.0, 0.0, 0.0))
     if frame is None:
         frame = frame_from_z(axis, (0.0, 1.0, 0.0))
         assert frame is not None
-    rotation = (rotation_about(axis, math.radians(rotation_deg)) @ frame).T.copy()
-    rotation.setflags(write=False)
-    return rotation
+    return frozen((rotation_about(axis, math.radians(rotation_deg)) @ frame).T)
 
 
 def up_and_rotation(environment: Environment) -> tuple[Vec3, float]:
     """`up` and `rotation_deg` that give back an environment's `world_to_local`."""
     x, _, z = environment.world_to_local
-    up = (float(z[0]), float(z[1]), float(z[2]))
+    up = vec3(z)
     unturned = world_to_local(up)
     return up, math.degrees(math.atan2(float(unturned[1] @ x), float(unturned[0] @ x)))
 
@@ -230,12 +227,10 @@ def _made(
 ) -> Environment:
     """An environment of this picture; `parameters`: the scene file's keys, without `lights`, which is added
     where it is false."""
-    rgb = np.ascontiguousarray(rgb, dtype=np.float32)
-    rgb.setflags(write=False)
     turned = world_to_local(parameters.get("up", Z_UP), parameters.get("rotation_deg", 0.0))
     parameters = {key: value if isinstance(value, int) else _plain(value) for key, value in parameters.items()}
     parameters |= {} if lights else {"lights": False}
-    return Environment(rgb, turned, kind, parameters, source, lights)
+    return Environment(frozen(np.asarray(rgb, np.float32)), turned, kind, parameters, source, lights)
 
 
 def _plain(value: Any) -> float | list[float]:

@@ -20,6 +20,7 @@ import numpy as np
 from .fields import Number, Vector, read_fields, write_fields
 from .io.scene_table import SceneTable
 from .scene import Dab, Material, SceneObject
+from .vectors import frozen
 
 MIN_LOG2_GAIN = -6.0
 MAX_LOG2_GAIN = math.log2(10.0)
@@ -189,8 +190,7 @@ class GainGrid:
                 continue
             offset = self._centres(x, y, z) - np.array(dab.position)
             log2[z, y, x] = _touched(log2[z, y, x], dab, _distance(offset))
-        log2.setflags(write=False)
-        return replace(self, log2=log2)
+        return replace(self, log2=frozen(log2))
 
     def _touched_range(self, dab: Dab, axis: int) -> slice:
         """Voxels of one axis whose centres a dab may reach."""

@@ -25,7 +25,7 @@ from .optics.spectrum import Spectrum
 from .scene import Scene
 from .scene_checks import MAX_LIGHTS
 from .texture import Environment
-from .vectors import Vec3
+from .vectors import frozen, unit, vec3
 
 SUN, WINDOW = "sun of the panorama", "window of the panorama"
 _MOST = 8
@@ -85,8 +85,8 @@ class PanoramaWindow:
     def light(self, name: str, centre: np.ndarray, distance: float) -> AreaLight:
         """Seen from `centre` (3,): so far away that it looks the same from everywhere near."""
         width, height = (2.0 * distance * half for half in self.half)
-        tangent, direction = _vector(self.tangent), _vector(-self.toward)
-        position, radiance = _vector(centre + distance * self.toward), _spectrum(self.radiance)
+        tangent, direction = vec3(self.tangent), vec3(-self.toward)
+        position, radiance = vec3(centre + distance * self.toward), _spectrum(self.radiance)
         if self.is_disc:
             return AreaLight(name, radiance, position, direction, tangent, "disc", 0.5 * width)
         return AreaLight(name, radiance, position, direction, tangent, "rectangle", width=width, height=height)
@@ -159,9 +159,7 @@ def lights_of(environment: Environment) -> tuple[tuple[DirectionalLight | Panora
                 rgb = rgb - covered[..., None] * window.radiance
     if not found:
         return (), environment
-    rest = rgb.astype(np.float32)
-    rest.setflags(write=False)
-    return tuple(found), replace(environment, rgb=rest)
+    return tuple(found), replace(environment, rgb=frozen(rgb.astype(np.float32)))
 
 
 def _regions(bright: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -198,12 +196,11 @@ def _sun(
     environment: Environment, spot: np.ndarray, excess: np.ndarray, flux: np.ndarray, solid: np.ndarray
 ) -> DirectionalLight:
     weights = excess.mean(axis=1) * solid
-    toward = weights @ _directions(environment, spot)
-    toward /= np.linalg.norm(toward)
+    toward = unit(weights @ _directions(environment, spot))
     # A disc of the brightest texel's radiance has the same light.
     size = flux.mean() / excess.mean(axis=1).max()
     diameter = max(SUN_DIAMETER_DEG, 2.0 * math.degrees(math.asin(math.sqrt(min(size / math.pi, 1.0)))))
-    return DirectionalLight(SUN, _spectrum(flux), _vector(-toward), diameter)
+    return DirectionalLight(SUN, _spectrum(flux), vec3(-toward), diameter)
 
 
 def _window(
@@ -215,13 +212,11 @@ def _window(
     bright = rgb.mean(axis=2)
     core = spot & (bright > _CORE * np.median(bright[spot]))
     places, weights = _directions(environment, core), solid[core]
-    toward = weights @ places
-    toward /= np.linalg.norm(toward)
+    toward = unit(weights @ places)
     guide = environment.world_to_local[2]
     if abs(toward @ guide) > 0.99:
         guide = environment.world_to_local[0]
-    level = np.cross(guide, toward)
-    level /= np.linalg.norm(level)
+    level = unit(np.cross(guide, toward))
     # On the plane that touches the sphere there, where a window far away has its own shape.
     ahead = places @ toward
     flat = np.stack([places @ level, places @ np.cross(toward, level)], axis=1) / ahead[:, None]
@@ -231,11 +226,9 @@ def _window(
     variances, axes = np.linalg.eigh(covariance)
     if variances[1] < 1.5 * variances[0] or variances[0] <= 0.0:
         variances, axes = np.diag(covariance), np.eye(2)  # as likely upright
-    toward = toward + middle @ np.stack([level, np.cross(toward, level)])
-    toward /= np.linalg.norm(toward)
+    toward = unit(toward + middle @ np.stack([level, np.cross(toward, level)]))
     tangent = axes[0, 0] * level + axes[1, 0] * np.cross(toward, level)
-    tangent -= toward * (toward @ tangent)
-    tangent /= np.linalg.norm(tangent)
+    tangent = unit(tangent - toward * (toward @ tangent))
     inner = ndimage.binary_erosion(core)
     # Hardly any of the rest is below nothing.
     radiance = np.maximum(np.quantile(rgb[inner if inner.any() else core], 0.1, axis=0) - around, 0.0)
@@ -276,11 +269,6 @@ def _directions(environment: Environment, chosen: np.ndarray) -> np.ndarray:
     rows, columns = np.nonzero(chosen)
     height, width = chosen.shape
     return direction_of(environment, (columns + 0.5) / width, (rows + 0.5) / height)
-
-
-def _vector(values: np.ndarray) -> Vec3:
-    x, y, z = (float(v) for v in values)
-    return x, y, z
 
 
 def _spectrum(rgb: np.ndarray) -> Spectrum:

@@ -24,7 +24,7 @@ from .placement import Surroundings, default_direction
 from .scene import Camera, Diffuse, Light, SceneObject
 from .scene_environment import STUDIO_MAP
 from .texture import Environment
-from .vectors import Vec3, vec3
+from .vectors import Vec3, frozen, unit, vec3
 
 KEY_DISTANCE = 9.0
 """Distance of the studio's lamp from the objects' middle, in their radii: rays are nearly parallel, caustics sharp."""
@@ -94,8 +94,7 @@ def default_camera(around: Surroundings) -> Camera:
     """Looks down from the front at the object and the place beside it where the caustic falls."""
     x, y, _ = default_direction()
     target = around.centre + around.radius * np.array([0.75 * x, 0.75 * y, -0.35])
-    away = np.array([0.18, -0.80, 0.57])
-    position = target + 7.5 * around.radius * away / np.linalg.norm(away)
+    position = target + 7.5 * around.radius * unit((0.18, -0.80, 0.57))
     return Camera(vec3(position), vec3(target), vertical_fov_deg=32.0)
 
 
@@ -106,9 +105,8 @@ def framing_camera(objects: Sequence[SceneObject]) -> Camera:
     x, y, z = key_direction()
     shadow = points - np.outer((points[:, 2] - floor) / z, (x, y, z))
     seen = np.concatenate([points, shadow])
-    away = _VIEW / np.linalg.norm(_VIEW)
-    right = np.cross((0.0, 0.0, 1.0), away)
-    right /= np.linalg.norm(right)
+    away = unit(_VIEW)
+    right = unit(np.cross((0.0, 0.0, 1.0), away))
     across, up, ahead = seen @ right, seen @ np.cross(away, right), -(seen @ away)
     tangent = math.tan(math.radians(0.5 * _FOV_DEG)) * _FILLED
     distance, middle = 0.0, []
@@ -171,8 +169,7 @@ def default_table(objects: Sequence[SceneObject]) -> SceneObject:
     matrix[:3, 3] = around.centre
     # A hair below, so that a flat underside and the table are not one surface.
     matrix[2, 3] = bounds_of(objects)[0][2] - 1e-3 * around.radius
-    matrix.setflags(write=False)
     size = 40.0 * around.radius
     mesh = plane(size, size, name="table")
     note_recipe(mesh, {"shape": "plane", "width": size, "height": size})
-    return SceneObject("table", mesh, Diffuse(_TABLE_RGB), matrix)
+    return SceneObject("table", mesh, Diffuse(_TABLE_RGB), frozen(matrix))

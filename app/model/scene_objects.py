@@ -27,6 +27,7 @@ from .naming import Names
 from .placement import read_placement
 from .scene import Material, SceneObject
 from .texture import TextureReader
+from .vectors import frozen
 
 INLINE = "inline"
 """Shape of triangles that stand in the scene file itself."""
@@ -136,8 +137,7 @@ def rested(mesh: Mesh, matrix: np.ndarray, rest: float | None) -> np.ndarray:
         lowest = float((mesh.vertices @ matrix[2, :3]).min()) + matrix[2, 3]
         matrix = matrix.copy()
         matrix[2, 3] += rest - lowest
-    matrix.setflags(write=False)
-    return matrix
+    return frozen(matrix)
 
 
 def _file_recipe(table: SceneTable, override: bool | None) -> dict[str, Any]:

@@ -22,10 +22,10 @@ from .optics import tints
 from .optics.index_file import find_glass
 from .optics.tints import Tint
 from .scene import Absorption, Dielectric, SceneObject
+from .vectors import frozen
 
 UpAxis = Literal["y", "z"]
-Y_UP_TO_Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
-Y_UP_TO_Z_UP.setflags(write=False)
+Y_UP_TO_Z_UP = frozen(np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]]))
 _USUAL_UP: dict[str, UpAxis] = {".obj": "y", ".stl": "z", ".ply": "z"}
 """What most programs write: OBJ comes from modellers, STL and PLY from printers and scanners."""
 _BASE_SHARE = 0.2
@@ -139,9 +139,7 @@ def tinted(item: SceneObject, tint: Tint) -> Dielectric:
     """What is usually coloured so, as deep that daylight is half as bright across half of `item`'s narrowest side."""
     points = item.mesh.vertices @ item.object_to_world[:3, :3].T
     depth = 0.5 * float(np.ptp(points, axis=0).min()) or 1.0
-    coefficient = tint.coefficient / depth
-    coefficient.setflags(write=False)
-    return Dielectric(tint.dispersion, Absorption(coefficient))
+    return Dielectric(tint.dispersion, Absorption(frozen(tint.coefficient / depth)))
 
 
 def _bodies(objects: Sequence[SceneObject]) -> list[int]:

@@ -16,6 +16,7 @@ import numpy as np
 from ..base.errors import UserError
 from .io.picture_files import read_picture
 from .io.scene_table import SceneTable
+from .vectors import frozen
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,6 +102,5 @@ def as_reflectance(rgb: np.ndarray, where: str) -> np.ndarray:
             f"{where}: {count} values lie above 1 (up to {rgb.max():.3g}), which no surface reflects; scale the "
             "picture down"
         )
-    rgb = np.clip(rgb, np.float32(0.0), np.float32(1.0))  # colours outside of Rec.709 have negative channels
-    rgb.setflags(write=False)
-    return rgb
+    # Colours outside of Rec.709 have negative channels.
+    return frozen(np.clip(rgb, np.float32(0.0), np.float32(1.0)))

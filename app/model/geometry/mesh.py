@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import UserError
+from ..vectors import frozen
 
 MAX_CONVEX_PLANES = 96
 """Enough for a brilliant with a faceted girdle (73)."""
@@ -78,9 +79,7 @@ class Mesh:
     @cached_property
     def _bounds(self) -> tuple[np.ndarray, np.ndarray]:
         used = self.corners().reshape(-1, 3)
-        low, high = used.min(axis=0), used.max(axis=0)
-        low.flags.writeable = high.flags.writeable = False
-        return low, high
+        return frozen(used.min(axis=0)), frozen(used.max(axis=0))
 
     @cached_property
     def flat_faces(self) -> tuple[Mesh, ...]:
@@ -111,9 +110,9 @@ class Mesh:
         """The same surface facing the other way."""
         return replace(
             self,
-            triangles=_frozen(self.triangles[:, ::-1]),
-            corner_normals=None if self.corner_normals is None else _frozen(-self.corner_normals[:, ::-1]),
-            uv=None if self.uv is None else _frozen(self.uv[:, ::-1]),
+            triangles=frozen(self.triangles[:, ::-1]),
+            corner_normals=None if self.corner_normals is None else frozen(-self.corner_normals[:, ::-1]),
+            uv=None if self.uv is None else frozen(self.uv[:, ::-1]),
         )
 
     def transformed(self, matrix: np.ndarray) -> Mesh:
@@ -135,10 +134,10 @@ class Mesh:
             uv = None if uv is None else uv[:, ::-1]
         return replace(
             self,
-            vertices=_frozen(vertices),
-            triangles=_frozen(triangles),
-            corner_normals=None if normals is None else _frozen(normals),
-            uv=None if uv is None else _frozen(uv),
+            vertices=frozen(vertices),
+            triangles=frozen(triangles),
+            corner_normals=None if normals is None else frozen(normals),
+            uv=None if uv is None else frozen(uv),
         )
 
     def determinant(self, matrix: np.ndarray) -> float:
@@ -228,10 +227,10 @@ def make_mesh(
         _expect_shape(where, "texture coordinates", coordinates, (len(faces), 3, 2))
     return Mesh(
         name=name,
-        vertices=_frozen(vertices),
-        triangles=_frozen(faces.astype(np.int32)),
-        corner_normals=None if normals is None else _frozen(normals),
-        uv=None if coordinates is None else _frozen(coordinates),
+        vertices=frozen(vertices),
+        triangles=frozen(faces.astype(np.int32)),
+        corner_normals=None if normals is None else frozen(normals),
+        uv=None if coordinates is None else frozen(coordinates),
         source=source,
         uv_unwraps=uv_unwraps,
     )
@@ -259,12 +258,6 @@ def _expect_shape(where: str, what: str, array: np.ndarray, shape: tuple[int, ..
         raise UserError(f"{where}: {what} have shape {array.shape} where {shape} is needed; give one for each corner")
 
 
-def _frozen(array: np.ndarray) -> np.ndarray:
-    array = np.ascontiguousarray(array)
-    array.setflags(write=False)
-    return array
-
-
 def convex_planes_of(mesh: Mesh, most: int = MAX_CONVEX_PLANES) -> np.ndarray | None:
     """As `Mesh.convex_planes`, up to `most` of them."""
     area_vectors, areas, slivers = mesh.area_vectors(), mesh.areas(), _slivers(mesh)
@@ -289,7 +282,7 @@ def convex_planes_of(mesh: Mesh, most: int = MAX_CONVEX_PLANES) -> np.ndarray | 
     used = mesh.vertices[np.unique(mesh.triangles)]
     if len(np.unique(used, axis=0)) != len(used):
         return None
-    return _frozen(np.array(planes))
+    return frozen(np.array(planes))
 
 
 def _coplanar_tolerance(mesh: Mesh) -> float:

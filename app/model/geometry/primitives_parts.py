@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...base.errors import UserError
+from ..vectors import frozen
 from .mesh import Mesh
 
 MAX_TRIANGLES = 4_000_000
@@ -53,8 +54,7 @@ def with_box_uv(mesh: Mesh) -> Mesh:
     # In units of the box every face is a unit square about 0.
     corners = mesh.corners() / (high - low)
     uv = 0.5 + np.stack([np.einsum("tcj,tj->tc", corners, axis) for axis in (right, up)], axis=2)
-    uv.setflags(write=False)
-    return replace(mesh, uv=uv, uv_unwraps=False)
+    return replace(mesh, uv=frozen(uv), uv_unwraps=False)
 
 
 def globe_uv(directions: np.ndarray, triangles: np.ndarray) -> np.ndarray:

@@ -36,7 +36,7 @@ from ..scene_defaults import (
     surroundings_of,
 )
 from ..staging import AS_FOUND, Y_UP_TO_Z_UP, Staging, opaque_note, with_glass
-from ..vectors import Vec3, vec3
+from ..vectors import Vec3, frozen, unit, vec3
 from .gltf_document import COMPRESSION, DRACO, GltfDocument, draco_mesh, open_document
 from .gltf_materials import (
     EXTRAS,
@@ -260,10 +260,8 @@ class _Reader:
                     self.document, primitive["material"], material, forms[number] == "sheet", self._unshown
                 )
             name = self._names.unique(label)
-            matrix = world.copy()
-            matrix.setflags(write=False)
             dabs = read_node_dabs(self.document, index, number, material)
-            self.objects.append(SceneObject(name, mesh, material, matrix, dabs))
+            self.objects.append(SceneObject(name, mesh, material, frozen(world.copy()), dabs))
             self._material_names.append(self._material_name(primitive.get("material")))
             self.origins.objects[name] = (index, number)
 
@@ -356,7 +354,7 @@ class _Reader:
         entry = self.document.item("cameras", node["camera"])
         self._check_turn(world, f"camera '{node.get('name', entry.get('name', 'camera'))}'")
         distance = float(own_extras(node).get("target_distance", _DEFAULT_DISTANCE))
-        position, forward, up = world[:3, 3], -_unit(world[:3, 2]), _unit(world[:3, 1])
+        position, forward, up = world[:3, 3], -unit(world[:3, 2]), unit(world[:3, 1])
         own = {
             field.attribute: own_extras(node)[field.attribute] for field in LENS if field.attribute in own_extras(node)
         }
@@ -408,14 +406,14 @@ class _Reader:
         from ..optics.spectrum import Spectrum
 
         self._check_turn(world, f"light '{label}'")
-        position, direction = vec3(world[:3, 3]), vec3(-_unit(world[:3, 2]))
+        position, direction = vec3(world[:3, 3]), vec3(-unit(world[:3, 2]))
         own = own_extras(entry).get("light")
         if own is not None:
             cls = LIGHT_KINDS.get(own.get("kind", "point"), Light)
             placed: dict[str, Any] = {"position": list(position)} if cls.has_place else {}
             placed |= {"direction": list(direction)} if cls.has_direction else {}
             has_tangent = "size" in own or cls.has_roll is True
-            placed |= {"tangent": list(vec3(_unit(world[:3, 0])))} if has_tangent else {}
+            placed |= {"tangent": list(vec3(unit(world[:3, 0])))} if has_tangent else {}
             table = SceneTable(own | placed, self.document.path, f"{LIGHTS}.extras.{EXTRAS}.light")
             return read_light(table, 0, around)
         kind = entry.get("type")
@@ -469,7 +467,3 @@ def _rotation(quaternion: Any) -> np.ndarray:
             (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
         ]
     )
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..naming import Unshown
 from ..texture import Texture
+from ..vectors import frozen
 from .gltf_document import Additions, GltfDocument
 from .picture_files import decode_8bit
 from .scene_pictures import nearest_levels, picture_name, png_bytes
@@ -90,8 +91,7 @@ class GltfTextures:
                 source = str((self._document.path.parent / unquote(uri)).resolve())
         rgb, notes = decode_8bit(data, f"{self._document.path.name}: {what}")
         self._notes += notes
-        rgb.setflags(write=False)
-        return rgb, source
+        return frozen(rgb), source
 
 
 class TextureWriter:

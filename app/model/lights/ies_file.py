@@ -19,6 +19,7 @@ from ...base import files
 from ...base.errors import UserError
 from ...base.paths import assets_dir
 from ..io.scene_table import MAX_MAGNITUDE
+from ..vectors import frozen
 
 MAX_BYTES = 1 << 20
 MAX_ANGLES = 4096
@@ -168,10 +169,7 @@ class _Numbers:
             vertical = np.concatenate([[0.0, 90.0 - _UNLIT_DEG], vertical])
             candela = np.hstack([dark, candela])
         peak = float(candela.max())
-        intensity = candela / peak
-        for array in (vertical, horizontal, intensity):
-            array.setflags(write=False)
-        return Profile(vertical, horizontal, intensity, peak, str(self._path.resolve()))
+        return Profile(frozen(vertical), frozen(horizontal), frozen(candela / peak), peak, str(self._path.resolve()))
 
     def _angles(self, count: int, which: str) -> np.ndarray:
         angles = np.array(self._take(count, f"{which} angles"))

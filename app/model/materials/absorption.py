@@ -14,7 +14,7 @@ from ..io import curve_file
 from ..io.scene_table import SceneTable
 from ..optics import tints
 from ..optics.colorimetry import VISIBLE_NM, attenuation_from_colour
-from ..vectors import Vec3
+from ..vectors import Vec3, frozen
 
 MAX_ATTENUATION = 1e15
 """Per scene unit; float32 holds it in any unit the renderer may choose."""
@@ -34,9 +34,7 @@ class Absorption:
     def of_colour(cls, rgb: Vec3, distance: float, where: str = "") -> Absorption:
         """White light has the linear colour `rgb` after `distance` scene units. Raises `UserError` that begins with
         `where`."""
-        coefficient = attenuation_from_colour(rgb, distance, where)
-        coefficient.setflags(write=False)
-        return cls(coefficient, (rgb, distance))
+        return cls(frozen(attenuation_from_colour(rgb, distance, where)), (rgb, distance))
 
 
 class AbsorptionPart(Part):
@@ -115,9 +113,7 @@ def _on_visible_grid(table: SceneTable, key: str, wavelength_nm: np.ndarray, val
         table.fail(key, "must be in nm, and these wavelengths look like µm: give 1000 times as much")
     if np.any(np.diff(wavelength_nm) <= 0.0):
         table.fail(key, "must list its wavelengths in ascending order")
-    curve = np.interp(VISIBLE_NM, wavelength_nm, values)
-    curve.setflags(write=False)
-    return curve
+    return frozen(np.interp(VISIBLE_NM, wavelength_nm, values))
 
 
 def _describe_absorption(absorption: Absorption) -> dict[str, Any]:

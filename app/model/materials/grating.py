@@ -14,6 +14,7 @@ from ..fields import Animated, Direction, Flag, Number, Part, Row, read_fields, 
 from ..io.scene_table import SceneTable, Vec3
 from ..optics import gratings
 from ..optics.glass import Dispersion
+from ..vectors import unit
 from .material import Material
 
 if TYPE_CHECKING:
@@ -279,8 +280,7 @@ class Grating(Material):
 
     def lines_in_world(self, object_to_world: np.ndarray) -> np.ndarray:
         """Unit vector (3,) along the lines, of an object placed so."""
-        along = np.asarray(object_to_world)[:3, :3] @ np.asarray(self.direction, float)
-        return along / np.linalg.norm(along)
+        return unit(np.asarray(object_to_world)[:3, :3] @ np.asarray(self.direction, float))
 
     def words(self) -> str:
         """Its lines, and where light goes."""

@@ -15,7 +15,7 @@ from ..fields import Number, Part, read_fields, write_fields
 from ..io.scene_table import SceneTable
 from ..optics.colorimetry import rgb_basis
 from ..texture import TextureReader
-from ..vectors import Vec3
+from ..vectors import Vec3, unit
 
 if TYPE_CHECKING:
     from ..geometry.mesh import Mesh
@@ -176,8 +176,7 @@ class Material:
 
     def axis_in_world(self, object_to_world: np.ndarray) -> np.ndarray:
         """Unit vector (3,) along the axis, of an object placed so."""
-        along = np.asarray(object_to_world)[:3, :3] @ np.asarray(self.axis, float)
-        return along / np.linalg.norm(along)
+        return unit(np.asarray(object_to_world)[:3, :3] @ np.asarray(self.axis, float))
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Raise UserError if object `name` of this file cannot have this material on its mesh."""

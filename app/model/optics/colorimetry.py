@@ -13,9 +13,9 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...base.paths import assets_dir
+from ..vectors import frozen
 
-VISIBLE_NM = np.arange(380.0, 780.5, 1.0)
-VISIBLE_NM.flags.writeable = False
+VISIBLE_NM = frozen(np.arange(380.0, 780.5, 1.0))
 
 K_M = 683.002
 """Maximum luminous efficacy of radiation, lm/W (CIE 15; 683 lm/W at 540 THz)."""
@@ -28,7 +28,7 @@ _PRIMARIES_XY = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])
 def cmf_xyz() -> np.ndarray:
     """CIE 1931 2° colour matching functions x̄, ȳ, z̄: float64 (401, 3), read-only."""
     values = np.loadtxt(assets_dir() / "spectra" / "cie_1931_2deg_1nm.csv", delimiter=",")
-    return _frozen(values[:, 1:])
+    return frozen(values[:, 1:])
 
 
 @cache
@@ -44,13 +44,13 @@ def illuminant_table() -> dict[str, np.ndarray]:
         names = file.readline().lstrip("# ").rstrip().split(",")[1:]
         values = np.loadtxt(file, delimiter=",")
     table = {
-        name: _frozen(np.interp(VISIBLE_NM, values[:, 0], column))
+        name: frozen(np.interp(VISIBLE_NM, values[:, 0], column))
         for name, column in zip(names, values[:, 1:].T, strict=True)
     }
     # CIE 15:2004, eq. 3.1: a Planckian radiator of 2848 K with c2 = 1.435e-2 m K, 100 at 560 nm.
     hot = np.expm1(1.435e7 / (2848.0 * 560.0)) / np.expm1(1.435e7 / (2848.0 * VISIBLE_NM))
-    table["A"] = _frozen(100.0 * (560.0 / VISIBLE_NM) ** 5 * hot)
-    table["E"] = _frozen(np.full(401, 100.0))
+    table["A"] = frozen(100.0 * (560.0 / VISIBLE_NM) ** 5 * hot)
+    table["E"] = frozen(np.full(401, 100.0))
     return table
 
 
@@ -61,7 +61,7 @@ def xyz_to_rgb709_matrix() -> np.ndarray:
     White is D65 of our own table and observer, so that D65 gives R = G = B to rounding; the
     published sRGB matrix has four digits and a rounded white.
     """
-    return _frozen(np.linalg.inv(rgb709_to_xyz_matrix()))
+    return frozen(np.linalg.inv(rgb709_to_xyz_matrix()))
 
 
 @cache
@@ -70,7 +70,7 @@ def rgb709_to_xyz_matrix() -> np.ndarray:
     white = illuminant_table()["D65"] @ cmf_xyz()
     x, y = _PRIMARIES_XY.T
     primaries = np.stack([x / y, np.ones(3), (1.0 - x - y) / y])
-    return _frozen(primaries * np.linalg.solve(primaries, white / white[1]))
+    return frozen(primaries * np.linalg.solve(primaries, white / white[1]))
 
 
 def xyz_to_rgb709(xyz: np.ndarray) -> np.ndarray:
@@ -87,7 +87,7 @@ def rgb709_to_xyz(rgb: np.ndarray) -> np.ndarray:
 def daylight_per_lumen() -> np.ndarray:
     """Spectral density of D65 whose K_m Σ S ȳ is 1 (a luminance of 1 lm/(sr unit²), say): float64 (401,), read-only."""
     daylight = illuminant_table()["D65"]
-    return _frozen(daylight / (K_M * (daylight @ cmf_xyz()[:, 1])))
+    return frozen(daylight / (K_M * (daylight @ cmf_xyz()[:, 1])))
 
 
 @cache
@@ -102,7 +102,7 @@ def rgb_basis() -> np.ndarray:
     """
     values = np.loadtxt(assets_dir() / "spectra" / "rgb_basis_1nm.csv", delimiter=",")[:, 1:]
     # The file's fifteen digits leave the sum a hair from 1; greys are to be flat.
-    return _frozen(values / values.sum(axis=1, keepdims=True))
+    return frozen(values / values.sum(axis=1, keepdims=True))
 
 
 def mirror_reflectance(rgb: tuple[float, float, float], nm: np.ndarray) -> np.ndarray:
@@ -131,9 +131,3 @@ def attenuation_from_colour(rgb: tuple[float, float, float], distance: float, wh
         return np.full(401, -np.log(colour[0]) / distance)
     # Its rounding must not make light brighter.
     return -np.log(np.minimum(rgb_basis() @ colour, 1.0)) / distance
-
-
-def _frozen(values: np.ndarray) -> np.ndarray:
-    values = np.ascontiguousarray(values, dtype=np.float64)
-    values.flags.writeable = False
-    return values

@@ -18,6 +18,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from . import dispersion_formulas as formulas
+from .colorimetry import VISIBLE_NM
 from .dispersion_formulas import Kind
 
 VISIBLE_RANGE_NM = (380.0, 780.0)
@@ -81,7 +82,7 @@ class Dispersion:
     @cached_property
     def is_dispersive(self) -> bool:
         """Whether n differs by more than 1e-7 anywhere between 380 and 780 nm."""
-        n = self.index(_CHECK_NM)
+        n = self.index(VISIBLE_NM)
         return bool(n.max() - n.min() > _FLAT)
 
     def clamps_visible(self) -> str | None:
@@ -101,14 +102,14 @@ class Dispersion:
         clamped = self.clamps_visible()
         notes = [clamped] if clamped else []
         label = self.name or "the index"
-        n = self.index(_CHECK_NM)
+        n = self.index(VISIBLE_NM)
         if self.gain != 1.0:
             notes.append(
                 f"{label}: its dispersion is {self.gain:g} times that of the material (dispersion_gain), which "
                 "nature does not offer."
             )
         if n.min() < 1.0:
-            at = _CHECK_NM[int(n.argmin())]
+            at = VISIBLE_NM[int(n.argmin())]
             notes.append(f"{label}: the index falls below 1 (n = {n.min():.6g} at {at:g} nm), which is legal but rare.")
         if self.kind == "abbe" and self.coefficients[0] > 1.0 and n.min() == 1.0:
             notes.append(
@@ -132,8 +133,6 @@ class Dispersion:
 
 _MOST_INDEX = 100.0
 """Coefficients and tables that give more have other units than they should."""
-_CHECK_NM = np.arange(380.0, 780.5, 1.0)
-_CHECK_NM.flags.writeable = False
 
 
 # ---- constructors; `where` opens an error's sentence ("scene.toml: materials.glass") --------
@@ -296,7 +295,7 @@ def _checked(dispersion: Dispersion, where: str) -> Dispersion:
                 f"{who}the Sellmeier term with C = {c:g} µm² has its pole at {1e3 * math.sqrt(c):.4g} nm, inside "
                 "the visible range; check B and C (C is in µm²)"
             )
-    n = dispersion.index(_CHECK_NM)
+    n = dispersion.index(VISIBLE_NM)
     most = math.inf if dispersion.kind in ("abbe", "constant") else _MOST_INDEX
     bad = ~(np.isfinite(n) & (n > 0.0) & (n < most))
     if np.any(bad):
@@ -304,6 +303,6 @@ def _checked(dispersion: Dispersion, where: str) -> Dispersion:
         state = "imaginary or infinite" if not np.isfinite(n[at]) else f"{n[at]:.6g}"
         remedy = f"lie below {_MOST_INDEX:g}; check the units (λ in µm)" if n[at] > 0.0 else "be a positive number"
         raise UserError(
-            f"{who}the refractive index is {state} at {_CHECK_NM[at]:g} nm; from 380 to 780 nm it must {remedy}"
+            f"{who}the refractive index is {state} at {VISIBLE_NM[at]:g} nm; from 380 to 780 nm it must {remedy}"
         )
     return dispersion

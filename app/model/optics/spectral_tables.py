@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..vectors import frozen
 from .colorimetry import K_M, VISIBLE_NM, cmf_xyz
 from .glass import Dispersion
 from .spectrum import Spectrum
@@ -63,9 +64,7 @@ class SpectralAxis:
     @cached_property
     def cell_edges_x(self) -> np.ndarray:
         """x of the ends of the cells λ ± ½ nm, (402,), read-only: every spectrum of a scene uses them."""
-        edges_x = self.x_of_nm(CELL_EDGES_NM)
-        edges_x.flags.writeable = False
-        return edges_x
+        return frozen(self.x_of_nm(CELL_EDGES_NM))
 
     def x_of_nm(self, wavelength_nm: np.ndarray | float) -> np.ndarray:
         """x of wavelengths (clamped to 380–780 nm), float64, same shape."""
@@ -115,9 +114,7 @@ class SpectralAxis:
     def nm_of_samples(self, count: int) -> np.ndarray:
         """Wavelengths of `count` equally spaced x from 0 to 1, float64 (count,); kept, so not to be written to."""
         if count not in self._sampled:
-            wavelengths = self.nm_of_x(np.linspace(0.0, 1.0, count))
-            wavelengths.setflags(write=False)
-            self._sampled[count] = wavelengths
+            self._sampled[count] = frozen(self.nm_of_x(np.linspace(0.0, 1.0, count)))
         return self._sampled[count]
 
     @cached_property

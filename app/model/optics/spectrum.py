@@ -15,6 +15,7 @@ import numpy as np
 
 from ...base.errors import UserError, suggestion
 from ..io.curve_file import clipped, note_ends, read_curve
+from ..vectors import frozen, vec3
 from .colorimetry import K_M, VISIBLE_NM, cmf_xyz, illuminant_table, xyz_to_rgb709
 
 _PLANCK_2HC2 = 1.191042972e-16
@@ -46,8 +47,7 @@ class Spectrum:
                 raise UserError(f"the line at {wavelength:g} nm is not visible; choose one from 380 to 780 nm")
             if not (math.isfinite(power) and power >= 0.0):
                 raise UserError(f"the line at {wavelength:g} nm has power {power:g}; give a number of 0 or more")
-        density.flags.writeable = False
-        object.__setattr__(self, "density", density)
+        object.__setattr__(self, "density", frozen(density))
         object.__setattr__(self, "lines", tuple(sorted((float(w), float(p)) for w, p in self.lines)))
 
     def __eq__(self, other: object) -> bool:
@@ -217,5 +217,4 @@ def rgb_under_white(reflectance: np.ndarray) -> tuple[float, float, float]:
     """Linear Rec.709 of a reflectance (401,) under D65, clipped to [0, 1]."""
     white = illuminant("D65")
     seen = Spectrum(white.density * reflectance).xyz() / white.luminous()
-    r, g, b = (float(v) for v in np.clip(xyz_to_rgb709(seen), 0.0, 1.0))
-    return r, g, b
+    return vec3(np.clip(xyz_to_rgb709(seen), 0.0, 1.0))

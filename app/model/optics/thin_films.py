@@ -14,7 +14,7 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..vectors import Vec3
+from ..vectors import Vec3, frozen
 from .glass import Dispersion, constant
 
 MAX_LAYERS = 1000
@@ -233,6 +233,4 @@ def _running_means(stack: Stack, sine: np.ndarray, nm: np.ndarray, polarised: bo
         found += [abs(s) ** 2, abs(p) ** 2, (s * p.conj()).real, (s * p.conj()).imag] if polarised else [mean]
     values = np.concatenate(found)
     sums = np.cumsum(0.5 * (values[:, 1:] + values[:, :-1]), axis=1) / (len(nm) - 1)
-    table = np.pad(sums[:, finer - 1 :: finer], ((0, 0), (1, 0))).astype(np.float32)
-    table.flags.writeable = False
-    return table
+    return frozen(np.pad(sums[:, finer - 1 :: finer], ((0, 0), (1, 0))).astype(np.float32))

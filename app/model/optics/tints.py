@@ -16,6 +16,7 @@ import numpy as np
 
 from ...base import files
 from ...base.paths import assets_dir
+from ..vectors import frozen
 from . import catalogue
 from .catalogue import search_key
 from .colorimetry import VISIBLE_NM, cmf_xyz, daylight_per_lumen
@@ -43,9 +44,7 @@ class Tint:
         curve = np.full(len(VISIBLE_NM), self.level)
         for centre_nm, width_nm, strength in self.bands:
             curve += strength * np.exp(-4.0 * math.log(2.0) * ((VISIBLE_NM - centre_nm) / width_nm) ** 2)
-        curve *= half_distance(curve)
-        curve.setflags(write=False)
-        return curve
+        return frozen(curve * half_distance(curve))
 
     @property
     def dispersion(self) -> Dispersion:
