@@ -30,7 +30,6 @@ class ExrLayer(NamedTuple):
     """float32 (H, W, 3), linear Rec.709."""
     others: dict[str, np.ndarray]
     """float32 (H, W): the rest of the part's channels, by name."""
-    texts: dict[str, str]
     notes: tuple[str, ...]
     is_converted: bool
     """From other primaries, so that colours may lie outside of Rec.709."""
@@ -74,9 +73,8 @@ def read_exr_layer(path: Path, wanted: str, max_pixels: int) -> ExrLayer:
     white = header.get("whiteLuminance")
     if isinstance(white, float) and 0.0 < white < 1e9 and white != 1.0:
         notes.append(f"says that its 1 is {white:g} cd/m²; intensity = {white:g} makes it that")
-    texts = {key: value for key, value in header.items() if isinstance(value, str)}
     others = {name: pixels for name, pixels in held.items() if name not in channels}
-    return ExrLayer(framed, others, texts, tuple(f"{path.name} {note}." for note in notes), matrix is not None)
+    return ExrLayer(framed, others, tuple(f"{path.name} {note}." for note in notes), matrix is not None)
 
 
 def _layers(parts: list[tuple[str, dict[str, Any]]]) -> dict[str, tuple[int, list[str]]]:

@@ -17,6 +17,7 @@ import errno
 import io
 import os
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -46,7 +47,6 @@ class Picture:
     """float32 (H, W, B), radiance per bin, or None."""
     wavelengths_nm: np.ndarray | None
     """float64 (B,), centres of the bins, rising, or None."""
-    metadata: dict[str, str]
     notes: tuple[str, ...] = ()
     """Sentences on what was assumed."""
     is_converted: bool = False
@@ -101,9 +101,9 @@ def write_image(
     exposure_ev: float | None = None,
     spectral: np.ndarray | None = None,
     bin_edges_nm: np.ndarray | None = None,
-    metadata: Mapping[str, str] | None = None,
     glare: float = 0.0,
     antialias: bool = True,
+    into: Path | None = None,
 ) -> None:
     """Write a picture; row 0 of the arrays is its top.
 
@@ -111,40 +111,21 @@ def write_image(
     (of pictures for looking at only). glare: share that the lens scatters, of those too; antialias:
     whether edges of what is overexposed have no steps (`highlights`), of those too. spectral: (H, W, B) radiance
     per bin in W/(m² sr), written as the channels
-    `S0.<centre>nm` of an .exr; bin_edges_nm: (B + 1,) rising. metadata: short texts kept in .png
-    and .exr. Raises `UserError` for an unknown suffix or a place that cannot be written, `BrokenPictureError` for
-    numbers that are not finite.
+    `S0.<centre>nm` of an .exr; bin_edges_nm: (B + 1,) rising. into: the file that the caller got from
+    `atomic_outputs` and that becomes `path`. Raises `UserError` for an unknown suffix or a place that cannot be
+    written, `BrokenPictureError` for numbers that are not finite.
     """
-    check_suffix(path)
-    with atomic_output(path) as temporary:
-        write_into(temporary, rgb, exposure_ev, spectral, bin_edges_nm, metadata, str(path), glare, antialias)
-
-
-def write_into(
-    part: Path,
-    rgb: np.ndarray,
-    exposure_ev: float | None = None,
-    spectral: np.ndarray | None = None,
-    bin_edges_nm: np.ndarray | None = None,
-    metadata: Mapping[str, str] | None = None,
-    name: str = "",
-    glare: float = 0.0,
-    antialias: bool = True,
-) -> None:
-    """As `write_image`, into a file that the caller got from `atomic_outputs`, together with others; `name`: what
-    messages call it."""
-    rgb = np.ascontiguousarray(rgb, np.float32)
-    if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
-        raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
-    check_finite(name or part.name, rgb, spectral)
-    metadata = dict(metadata or {})
-    kind = format_of(part)
-    check_side(name or part, (rgb.shape[1], rgb.shape[0]), kind.largest_side)
-    if kind.is_shown:
-        codes, texts = _developed(rgb, exposure_ev or 0.0, glare, antialias)
-        kind.write(part, codes, Extras(texts | metadata))
-    else:
-        kind.write(part, rgb, Extras(metadata, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm))
+    kind = format_of(path)
+    with atomic_output(path) if into is None else nullcontext(into) as part:
+        rgb = np.ascontiguousarray(rgb, np.float32)
+        if rgb.ndim != 3 or rgb.shape[2] != 3 or 0 in rgb.shape:
+            raise ValueError(f"a picture is (H, W, 3) and not empty, got {rgb.shape}")
+        check_finite(str(path), rgb, spectral)
+        check_side(path, (rgb.shape[1], rgb.shape[0]), kind.largest_side)
+        if kind.is_shown:
+            kind.write(part, *_developed(rgb, exposure_ev or 0.0, glare, antialias))
+        else:
+            kind.write(part, rgb, Extras({}, _spectral_channels(rgb, spectral, bin_edges_nm), bin_edges_nm))
 
 
 def check_finite(name: str, *pictures: np.ndarray | None) -> None:
@@ -164,15 +145,14 @@ def shown_bytes(
     """The file, .png or .jpg, that `write_image` would write of `rgb`, float32 (H, W, 3)."""
     check_finite("the picture", rgb)
     buffer = io.BytesIO()
-    codes, texts = _developed(rgb, exposure_ev, glare, antialias)
-    _BY_SUFFIX[suffix].write(buffer, codes, Extras(texts))
+    _BY_SUFFIX[suffix].write(buffer, *_developed(rgb, exposure_ev, glare, antialias))
     return buffer.getvalue()
 
 
-def _developed(rgb: np.ndarray, exposure_ev: float, glare: float, antialias: bool) -> tuple[np.ndarray, dict[str, str]]:
+def _developed(rgb: np.ndarray, exposure_ev: float, glare: float, antialias: bool) -> tuple[np.ndarray, Extras]:
     """sRGB codes of a picture to look at, and how it was exposed."""
     ev = auto_exposure(rgb) + exposure_ev
-    return tone_map_8bit(with_glare(rgb, glare), ev, antialias), {"Exposure": f"{ev:+.3f} EV"}
+    return tone_map_8bit(with_glare(rgb, glare), ev, antialias), Extras({"Exposure": f"{ev:+.3f} EV"})
 
 
 def read_image(path: Path | str, layer: str = "") -> Picture:
@@ -257,9 +237,8 @@ def _read_png(path: Path, layer: str) -> Picture:
 
     with Image.open(path, formats=("PNG",)) as image:
         _check_pixels(image.width, image.height)
-        texts = {str(key): str(value) for key, value in getattr(image, "text", {}).items()}
         encoded = np.asarray(image.convert("RGB"), np.float32) / np.float32(255)
-    return Picture(srgb_eotf(encoded).astype(np.float32), None, None, texts)
+    return Picture(srgb_eotf(encoded).astype(np.float32), None, None)
 
 
 def _spectral_channels(
@@ -279,8 +258,7 @@ def _spectral_channels(
 def _write_exr(path: Path | io.BytesIO, rgb: np.ndarray, extras: Extras) -> None:
     import OpenEXR
 
-    header: dict[str, object] = {str(key): str(value) for key, value in extras.texts.items()}
-    header |= {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header: dict[str, object] = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     header["chromaticities"] = REC709
     channels = {name: np.ascontiguousarray(rgb[:, :, i]) for i, name in enumerate("RGB")}
     if extras.channels:
@@ -304,7 +282,7 @@ def _read_exr(path: Path, layer: str) -> Picture:
     }
     wavelengths = np.array(sorted(waves), np.float64)
     spectral = np.stack([waves[w] for w in wavelengths], axis=-1) if waves else None
-    return Picture(held.rgb, spectral, wavelengths if waves else None, held.texts, held.notes, held.is_converted)
+    return Picture(held.rgb, spectral, wavelengths if waves else None, held.notes, held.is_converted)
 
 
 def _read_npy(path: Path, layer: str) -> Picture:
@@ -313,7 +291,7 @@ def _read_npy(path: Path, layer: str) -> Picture:
         raise ValueError(f"its shape is {rgb.shape}, not (H, W, 3)")
     _check_pixels(rgb.shape[1], rgb.shape[0])
     with np.errstate(over="ignore", invalid="ignore"):  # what float32 does not hold becomes infinite
-        return Picture(rgb.astype(np.float32), None, None, {})
+        return Picture(rgb.astype(np.float32), None, None)
 
 
 def _check_pixels(width: int, height: int) -> None:

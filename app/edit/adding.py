@@ -10,6 +10,7 @@ import numpy as np
 from ..base.errors import UserError, suggestion
 from ..model.contacts import world_bounds
 from ..model.materials.dielectric import DEFAULT_GLASS
+from ..model.naming import free_name
 from ..model.optics import catalogue
 from ..model.scene import Dielectric, Diffuse, Material, Scene, SceneObject
 from ..model.scene_checks import check_scene
@@ -17,7 +18,6 @@ from ..model.scene_defaults import bounds_of, environment_of
 from ..model.scene_objects import INLINE, make_shape
 from ..model.scene_objects import SHAPES as ALL_SHAPES
 from ..model.vectors import frozen
-from .names import free_name
 
 SHAPES = tuple(shape for shape in ALL_SHAPES if shape not in ("doublet", "revolution", "height_field", INLINE))
 """What can be added, by its name in the scene file."""

@@ -10,12 +10,12 @@ import numpy as np
 from ..base.errors import UserError
 from ..base.paths import MESH_SUFFIXES
 from ..model.io.bare_mesh import objects_of_mesh
+from ..model.naming import free_name
 from ..model.scene import Scene
 from ..model.scene_checks import check_scene
 from ..model.scene_defaults import environment_of
 from ..model.staging import AS_FOUND
 from .adding import beside
-from .names import free_name
 from .opening import open_scene
 
 _TOO_LARGE, _TOO_SMALL = 20.0, 1.0 / 20.0

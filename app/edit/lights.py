@@ -14,6 +14,7 @@ from ..base.errors import UserError
 from ..model.lights import LIGHT_KINDS, IesLight
 from ..model.lights.ies_file import read_ies
 from ..model.lights.light import DEFAULT_ILLUMINANCE, PowerKey, made
+from ..model.naming import checked_name, free_name
 from ..model.optics import spectrum as spectra
 from ..model.optics.spectrum import Spectrum
 from ..model.placement import default_direction
@@ -23,7 +24,6 @@ from ..model.scene_defaults import environment_of
 from ..model.spectrum_file import describe_spectrum
 from ..model.vectors import vec3
 from .adding import up_frame
-from .names import checked_name, free_name
 from .objects import MAX_LENGTH
 from .projection import View
 

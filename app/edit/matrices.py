@@ -13,6 +13,7 @@ import math
 import numpy as np
 import pyrr
 
+from ..model.placement import angles_deg
 from ..model.scene import Vec3
 from ..model.vectors import vec3
 
@@ -42,7 +43,9 @@ def decompose(matrix: np.ndarray) -> Placement:
         mirrored = int(np.argmin(np.diagonal(axes)))
         axes[:, mirrored] *= -1.0
         scale[mirrored] *= -1.0
-    return vec3(matrix[:3, 3]), _angles_deg(axes), vec3(scale)
+    # What is left of rounding would be shown as "-0.00".
+    angles = vec3(0.0 if abs(angle) < 1e-10 else angle for angle in angles_deg(axes))
+    return vec3(matrix[:3, 3]), angles, vec3(scale)
 
 
 def with_position(matrix: np.ndarray, position: Vec3) -> np.ndarray:
@@ -73,15 +76,3 @@ def nearest_orthogonal(axes: np.ndarray) -> np.ndarray:
         return axes.copy()
     u, _, v = np.linalg.svd(axes)
     return u @ v
-
-
-def _angles_deg(rotation: np.ndarray) -> Vec3:
-    """Angles about fixed x, y, z of a rotation matrix."""
-    level = math.hypot(rotation[0, 0], rotation[1, 0])
-    y = math.atan2(-rotation[2, 0], level)
-    if level < 1e-9:  # x and z turn about one axis: all of it is given to z
-        x, z = 0.0, math.atan2(-rotation[0, 1], rotation[1, 1])
-    else:
-        x, z = math.atan2(rotation[2, 1], rotation[2, 2]), math.atan2(rotation[1, 0], rotation[0, 0])
-    # What is left of rounding would be shown as "-0.00".
-    return vec3([0.0 if abs(angle) < 1e-10 else angle for angle in np.degrees([x, y, z])])

@@ -16,13 +16,13 @@ import numpy as np
 
 from ..base.errors import UserError
 from ..model.local_dispersion import MAX_DAB_LOG2
+from ..model.naming import checked_name, free_name
 from ..model.optics import catalogue
 from ..model.scene import Dab, Dielectric, Diffuse, Material, Mirror, Scene, SceneObject, Vec3
 from ..model.scene_checks import check_outside, check_scene
 from ..model.vectors import frozen
 from . import matrices
 from .adding import add_object, beside
-from .names import checked_name, free_name
 
 MAX_LENGTH = 1e30
 """As in a scene file: float32 ends at 3e38."""

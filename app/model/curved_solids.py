@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .contacts import contacts, nested_pairs
-from .geometry.primitives_lens import vertices_of
+from .geometry.primitives_lens import sag_and_slope, vertices_of
 from .scene import Scene, SceneObject
 
 MOST_FACES = 24
@@ -102,25 +102,23 @@ def _ball(recipe: Mapping[str, Any]) -> Iterator[Face]:
 def _lens(recipe: Mapping[str, Any]) -> Iterator[Face]:
     if recipe.get("conic1", 0.0) or recipe.get("conic2", 0.0):
         return
-    (start, end), aperture = (
-        vertices_of(recipe.get("thickness", 0.3), recipe.get("front")),
-        0.5 * float(recipe.get("diameter", 1.0)),
-    )
-    # Curvatures, positive where a face bulges.
-    first, second = _curvature(recipe.get("radius1", 1.0)), -_curvature(recipe.get("radius2", -1.0))
+    start, end = vertices_of(recipe.get("thickness", 0.3), recipe.get("front"))
+    aperture = 0.5 * float(recipe.get("diameter", 1.0))
+    # Radii, positive where a face bulges.
+    signed = float(recipe.get("radius1", 1.0)), -float(recipe.get("radius2", -1.0))
+    first, second = (math.inf if math.isinf(radius) else radius for radius in signed)
     if min(first, second) < 0.0:
         return
     r = aperture * np.linspace(0.0, 1.0, 65)
-    low, high = start + _sag(first, r), end - _sag(second, r)
+    bulges = [sag_and_slope(r, radius, 0.0)[0] for radius in (first, second)]
+    low, high = start + bulges[0], end - bulges[1]
     # Each face's sphere has a second half, which must not cut the lens.
     slack = _ROUNDING * aperture
-    if first and (high > start + _other_half(first, r) + slack).any():
-        return
-    if second and (low < end - _other_half(second, r) - slack).any():
+    if (high > start + 2.0 * first - bulges[0] + slack).any() or (low < end - 2.0 * second + bulges[1] - slack).any():
         return
     up = np.array([0.0, 0.0, 1.0])
-    for curvature, vertex, inward in ((first, start, up), (second, end, -up)):
-        yield Face(math.sqrt(curvature) * np.eye(3), vertex * up, inward, 0.0)
+    for radius, vertex, inward in ((first, start, up), (second, end, -up)):
+        yield Face(math.sqrt(1.0 / radius) * np.eye(3), vertex * up, inward, 0.0)
     if high[-1] - low[-1] > slack:
         yield _tube(aperture)
 
@@ -141,21 +139,6 @@ def _cylinder(recipe: Mapping[str, Any]) -> Iterator[Face]:
 def _tube(radius: float) -> Face:
     """All round the z axis."""
     return Face(np.diag([1.0, 1.0, 0.0]) / math.sqrt(radius), np.zeros(3), np.zeros(3), radius)
-
-
-def _curvature(radius: float) -> float:
-    return 0.0 if math.isinf(radius) else 1.0 / float(radius)
-
-
-def _sag(curvature: float, r: np.ndarray) -> np.ndarray:
-    """How far a sphere has bent away from its vertex's plane at distance `r` from the axis (Born and Wolf, Principles
-    of Optics, §4.4)."""
-    return curvature * r * r / (1.0 + np.sqrt(np.maximum(1.0 - (curvature * r) ** 2, 0.0)))
-
-
-def _other_half(curvature: float, r: np.ndarray) -> np.ndarray:
-    """Likewise, of the half that does not hold the vertex."""
-    return 2.0 / curvature - _sag(curvature, r)
 
 
 _FACES: dict[str, Callable[[Mapping[str, Any]], Iterator[Face]]] = {

@@ -55,9 +55,7 @@ def from_map(
             "stretched."
         )
     if width > MAX_WIDTH or height > MAX_HEIGHT:
-        rgb = averaged_rows(averaged_rows(rgb, min(height, MAX_HEIGHT)).swapaxes(0, 1), min(width, MAX_WIDTH)).swapaxes(
-            0, 1
-        )
+        rgb = averaged_down(rgb, MAX_HEIGHT, MAX_WIDTH)
         assumed.append(f"{path.name} is {width} × {height}; it was averaged down to {rgb.shape[1]} × {rgb.shape[0]}.")
     with np.errstate(over="ignore"):
         rgb = np.ascontiguousarray(rgb) * np.float32(intensity)
@@ -198,17 +196,20 @@ def _baked_directions() -> np.ndarray:
     """Local unit directions of the texels' centres of a baked picture, float64 (BAKED_HEIGHT, BAKED_WIDTH, 3)."""
     u = (np.arange(BAKED_WIDTH) + 0.5) / BAKED_WIDTH
     v = (np.arange(BAKED_HEIGHT)[:, None] + 0.5) / BAKED_HEIGHT
-    return direction_of(
-        Environment(np.zeros((1, 1, 3), np.float32)), np.broadcast_to(u, (BAKED_HEIGHT, BAKED_WIDTH)), v + 0.0 * u
-    )
+    return direction_of(Environment(np.zeros((1, 1, 3), np.float32)), u, v)
 
 
-def averaged_rows(rgb: np.ndarray, rows: int) -> np.ndarray:
-    """Area-weighted means over the first axis, float32 (rows, …)."""
+def averaged_down(rgb: np.ndarray, height: int, width: int) -> np.ndarray:
+    """A picture of at most this size, float32 (h, w, 3): area-weighted means of one that is larger."""
+    return _averaged_rows(_averaged_rows(rgb, height).swapaxes(0, 1), width).swapaxes(0, 1)
+
+
+def _averaged_rows(rgb: np.ndarray, rows: int) -> np.ndarray:
+    """Area-weighted means over the first axis where it is longer than `rows`."""
     from scipy.sparse import csr_matrix
 
     source = rgb.shape[0]
-    if rows == source:
+    if rows >= source:
         return rgb
     # Cut the range at the borders of both grids: every piece lies in one row of each.
     cuts = np.union1d(np.arange(source + 1.0), np.arange(rows + 1.0) * source / rows)

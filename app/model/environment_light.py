@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.random_words import random_word
-from .environment import averaged_rows
+from .environment import averaged_down, direction_of
 from .optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis, xyz_to_rgb709
 from .optics.spectral_tables import SpectralAxis
 from .scene import Scene
@@ -77,11 +77,7 @@ class EnvironmentLight:
         rgb = np.asarray(self.environment.rgb, np.float32)
         if rgb.shape[0] < _LEAST_HEIGHT or rgb.shape[1] < 2 * _LEAST_HEIGHT:
             rgb = _interpolated(rgb, max(rgb.shape[0], _LEAST_HEIGHT), max(rgb.shape[1], 2 * _LEAST_HEIGHT))
-        if rgb.shape[0] > HEIGHT:
-            rgb = averaged_rows(rgb, HEIGHT)
-        if rgb.shape[1] > WIDTH:
-            rgb = averaged_rows(rgb.swapaxes(0, 1), WIDTH).swapaxes(0, 1)
-        return np.asarray(rgb, float)
+        return np.asarray(averaged_down(rgb, HEIGHT, WIDTH), float)
 
     @cached_property
     def _solid_angles(self) -> np.ndarray:
@@ -129,17 +125,8 @@ class EnvironmentLight:
             solid = _blocks(np.array(solid)[..., None], step)[..., 0]
             rgb = power / solid[..., None]
         height, width = solid.shape
-        polar = np.pi * (np.arange(height) + 0.5) / height
-        azimuth = 2.0 * np.pi * (0.5 - (np.arange(width) + 0.5) / width)
-        local = np.stack(
-            [
-                np.sin(polar)[:, None] * np.cos(azimuth),
-                np.sin(polar)[:, None] * np.sin(azimuth),
-                np.broadcast_to(np.cos(polar)[:, None], solid.shape),
-            ],
-            axis=-1,
-        )
-        world = (local @ self.environment.world_to_local).reshape(-1, 3)
+        u, v = (np.arange(width) + 0.5) / width, (np.arange(height)[:, None] + 0.5) / height
+        world = direction_of(self.environment, u, v).reshape(-1, 3)
         power = (rgb * solid[..., None]).reshape(-1, 3)
         distinct, which = np.unique(np.round(normals, 6), axis=0, return_inverse=True)
         found = np.empty((len(distinct), 3))

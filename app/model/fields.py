@@ -122,14 +122,12 @@ class Number(Field):
 
 
 @dataclass(frozen=True)
-class Integer(Field):
+class Integer(Number):
     """A whole number within bounds."""
-
-    at_least: int = 0
-    at_most: int = 0
 
     def value(self, table: SceneTable, key: str) -> int:
         """The number."""
+        assert self.at_least is not None and self.at_most is not None
         return table.integer(key, self.default, at_least=self.at_least, at_most=self.at_most)
 
 

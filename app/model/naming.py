@@ -26,6 +26,27 @@ class Names(set[str]):
         return chosen
 
 
+def free_name(wanted: str, taken: Sequence[str]) -> str:
+    """`wanted`, or with the first number from 2 on that makes it new ("prism 2"); a number it ends in is counted on."""
+    if wanted not in taken:
+        return wanted
+    stem, _, tail = wanted.rpartition(" ")
+    stem, number = (stem, int(tail)) if stem and tail.isdecimal() else (wanted, 1)
+    while f"{stem} {number}" in taken or number < 2:
+        number += 1
+    return f"{stem} {number}"
+
+
+def checked_name(wanted: str, taken: Sequence[str], noun: str) -> str:
+    """A name a scene file could hold, blanks around it removed. Raises UserError for an empty or taken one."""
+    name = " ".join(wanted.split())
+    if not name:
+        raise UserError(f"the {noun} needs a name")
+    if name in taken:
+        raise UserError(f"another {noun} is called '{name}' already; choose a name of its own")
+    return name
+
+
 def listed(names: Sequence[str], most: int = 6) -> str:
     """Names for a sentence, the first `most` of them."""
     shown = ", ".join(f"'{name}'" for name in names[:most])

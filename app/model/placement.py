@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .io.scene_table import SceneTable
-from .vectors import Vec3
+from .vectors import Vec3, unit, vec3
 
 
 @dataclass(frozen=True)
@@ -25,14 +25,11 @@ class Surroundings:
     """Half the diagonal of their bounds, scene units."""
 
 
-def default_direction() -> Vec3:
+def default_direction(elevation_deg: float = 38.0) -> Vec3:
     """A low afternoon sun from behind on the left: long caustics that run towards the viewer."""
-    azimuth, elevation = math.radians(25.0), math.radians(38.0)
-    return (
-        math.cos(elevation) * math.cos(azimuth),
-        -math.cos(elevation) * math.sin(azimuth),
-        -math.sin(elevation),
-    )
+    azimuth, elevation = math.radians(25.0), math.radians(elevation_deg)
+    flat = math.cos(elevation)
+    return flat * math.cos(azimuth), -flat * math.sin(azimuth), -math.sin(elevation)
 
 
 PLACEMENT_KEYS = (
@@ -73,6 +70,18 @@ def rotation_about(axis: Vec3, angle_rad: float) -> np.ndarray:
     return np.eye(3) + math.sin(angle_rad) * cross + (1.0 - math.cos(angle_rad)) * (cross @ cross)
 
 
+def angles_deg(rotation: np.ndarray) -> Vec3:
+    """Angles about the fixed axes x, then y, then z of a rotation matrix (3, 3); where x and z turn about one axis, all
+    of it is given to z."""
+    level = math.hypot(rotation[0, 0], rotation[1, 0])
+    y = math.atan2(-rotation[2, 0], level)
+    if level < 1e-9:
+        x, z = 0.0, math.atan2(-rotation[0, 1], rotation[1, 1])
+    else:
+        x, z = math.atan2(rotation[2, 1], rotation[2, 2]), math.atan2(rotation[1, 0], rotation[0, 0])
+    return vec3(np.degrees([x, y, z]))
+
+
 def frame_from_z(z_axis: Vec3, x_hint: Vec3 | None = None) -> np.ndarray | None:
     """Right-handed orthonormal frame, float64 (3, 3) of columns x, y, z, whose z is `z_axis` (unit).
 
@@ -85,10 +94,9 @@ def frame_from_z(z_axis: Vec3, x_hint: Vec3 | None = None) -> np.ndarray | None:
         x_hint = (1.0, 0.0, 0.0) if math.hypot(z[0], z[1]) < 1e-9 else (-z[1], z[0], 0.0)
     x = np.asarray(x_hint, dtype=np.float64)
     x = x - z * (x @ z)
-    length = float(np.linalg.norm(x))
-    if length < 1e-9 * float(np.linalg.norm(x_hint)):
+    if np.linalg.norm(x) < 1e-9 * np.linalg.norm(x_hint):
         return None
-    x = x / length
+    x = unit(x)
     return np.column_stack([x, np.cross(z, x), z])
 
 

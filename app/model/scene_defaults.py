@@ -28,7 +28,8 @@ from .vectors import Vec3, frozen, unit, vec3
 
 KEY_DISTANCE = 9.0
 """Distance of the studio's lamp from the objects' middle, in their radii: rays are nearly parallel, caustics sharp."""
-_KEY_AZIMUTH_DEG, _KEY_ELEVATION_DEG = 25.0, 46.0
+_KEY_ELEVATION_DEG = 46.0
+"""The studio's lamp stands higher than the sun of `default_direction`."""
 _POOL = 5.0
 """Radius of the lamp's pool of light, in radii of the objects: it fades within the picture."""
 _POOL_INNER = 0.35
@@ -102,7 +103,7 @@ def framing_camera(objects: Sequence[SceneObject]) -> Camera:
     """Sees all but the ground, and where the studio's lamp casts its shadow and caustic, as large as they fit."""
     points = np.concatenate([_some_points(o) for o in parts_of(objects)])
     floor = points[:, 2].min()
-    x, y, z = key_direction()
+    x, y, z = default_direction(_KEY_ELEVATION_DEG)
     shadow = points - np.outer((points[:, 2] - floor) / z, (x, y, z))
     seen = np.concatenate([points, shadow])
     away = unit(_VIEW)
@@ -134,17 +135,10 @@ def default_light() -> Light:
     return DirectionalLight("sun", power, default_direction(), SUN_DIAMETER_DEG)
 
 
-def key_direction() -> Vec3:
-    """In which the light of the studio's lamp travels."""
-    azimuth, elevation = math.radians(_KEY_AZIMUTH_DEG), math.radians(_KEY_ELEVATION_DEG)
-    flat = math.cos(elevation)
-    return flat * math.cos(azimuth), -flat * math.sin(azimuth), -math.sin(elevation)
-
-
 def studio_lights(around: Surroundings) -> tuple[Light, Light]:
     """A lamp whose pool of light fades on the table, and wide weak light from above."""
     white, distance = illuminant("D65"), KEY_DISTANCE * around.radius
-    direction = key_direction()
+    direction = default_direction(_KEY_ELEVATION_DEG)
     lamp = SpotLight(
         "lamp",
         white.scaled_to_luminous(DEFAULT_ILLUMINANCE * distance**2),

@@ -18,7 +18,7 @@ import numpy as np
 from ..base import files
 from ..base.atomic import atomic_outputs
 from ..base.errors import UserError, suggestion
-from ..base.image_io import check_finite, check_suffix, write_into
+from ..base.image_io import check_finite, check_suffix, write_image
 from ..base.tone_map import auto_exposure
 from ..edit.parameters import Stage
 from ..gpu.context import Context
@@ -143,7 +143,7 @@ def write_map(baked: Drawn, scene: Scene, receiver: str, path: Path) -> None:
     if path.suffix.lower() == ".png":
         numbers["exposure_ev"] = auto_exposure(rgb)
     with atomic_outputs(*written_with(path)) as (picture, note):
-        write_into(picture, rgb, antialias=False)  # a texture: a pixel stays what it is
+        write_image(path, rgb, antialias=False, into=picture)  # a texture: a pixel stays what it is
         note.write_text(json.dumps(numbers, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..base.atomic import atomic_outputs
 from ..base.errors import UserError
-from ..base.image_io import check_finite, save_codes, write_into
+from ..base.image_io import check_finite, save_codes, write_image
 from ..base.tone_map import srgb_oetf
 from ..model.io.lit_mesh import check_usd, texture_path, write_lit_gltf, write_lit_usd
 from ..model.scene import Scene
@@ -101,7 +101,7 @@ def _write_cookie(
         if is_png:
             save_codes(picture, np.rint(255.0 * srgb_oetf(np.clip(made.rgb, 0.0, 1.0))).astype(np.uint8))
         else:
-            write_into(picture, made.rgb)
+            write_image(path, made.rgb, into=picture)
         note.write_text(_text(numbers), encoding="utf-8")
 
 

@@ -102,9 +102,9 @@ def test_haze_scatters_neither_all_forward_nor_all_back(tmp_path: Path, value: s
         read(Render, {"haze_anisotropy": value})
 
 
-@pytest.mark.parametrize(("key", "value", "bounds"), [("bounces", 4, "0 and 3"), ("haze", -1.0, "")])
+@pytest.mark.parametrize(("key", "value", "bounds"), [("bounces", 4, "at most 3"), ("haze", -1.0, "at least 0")])
 def test_an_edit_has_the_bounds_of_the_file(tmp_path: Path, key: str, value: float, bounds: str) -> None:
-    with pytest.raises(UserError, match=f"{key} is {value:g} but must be between {bounds}"):
+    with pytest.raises(UserError, match=f"{key} is {value:g} but must be {bounds}"):
         edits.set_render_defaults(load(tmp_path, TEXT), **{key: value})
 
 

@@ -89,14 +89,17 @@ class Mesh:
         return tuple(map(self._face, planes)) if 1 < len(planes) <= MAX_FLAT_FACES else ()
 
     def _face(self, rows: np.ndarray) -> Mesh:
-        used, corners = np.unique(self.triangles[np.sort(rows)], return_inverse=True)
+        return replace(self.part(np.sort(rows)), corner_normals=None, whole=self)
+
+    def part(self, rows: np.ndarray) -> Mesh:
+        """The triangles `rows` (n,) alone, with the vertices that they use."""
+        used, corners = np.unique(self.triangles[rows], return_inverse=True)
         return replace(
             self,
             vertices=self.vertices[used],
             triangles=corners.reshape(-1, 3).astype(np.int32),
-            corner_normals=None,
-            uv=None if self.uv is None else self.uv[np.sort(rows)],
-            whole=self,
+            corner_normals=None if self.corner_normals is None else self.corner_normals[rows],
+            uv=None if self.uv is None else self.uv[rows],
         )
 
     def volume(self) -> float:

@@ -182,11 +182,6 @@ def _corner_angles(corners: np.ndarray) -> np.ndarray:
 
 def _smoothing_groups(mesh: Mesh, crease_deg: float) -> np.ndarray:
     """Number of the smooth fan each corner belongs to, int (T, 3)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     edges = Edges.of(mesh)
     at_one, at_other = np.split(edges.ends()[:, edges.bend_deg <= crease_deg + 1e-4], 2)
-    size = edges.vertex.size
-    graph = coo_matrix((np.ones(at_one.size, np.int8), (at_one.ravel(), at_other.ravel())), shape=(size, size)).tocsr()
-    return connected_components(graph, directed=False)[1].reshape(-1, 3)
+    return connected_roots(at_one.ravel(), at_other.ravel(), edges.vertex.size).reshape(-1, 3)

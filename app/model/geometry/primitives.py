@@ -16,7 +16,7 @@ import numpy as np
 from .mesh import Mesh, make_mesh
 from .primitives_gem import brilliant, step_cut
 from .primitives_lens import lens
-from .primitives_parts import count, in_range, positive, with_box_uv
+from .primitives_parts import band, count, in_range, positive, with_box_uv
 from .primitives_round import ellipsoid, solid_of_revolution, sphere, torus
 from .primitives_water import height_field, rippled_water
 
@@ -118,12 +118,7 @@ def extruded(name: str, outline: np.ndarray, length: float, upright: bool = True
     across = np.tile(outline, (2, 1))
     # (x, y, z) -> (x, -z, y) is a quarter turn about x, so the winding holds.
     vertices = np.hstack([across, along]) if upright else np.hstack([across[:, :1], -along, across[:, 1:]])
-    following = np.roll(low, -1)
-    sides = np.concatenate(
-        [np.stack([low, following, high[following]], axis=1), np.stack([low, high[following], high], axis=1)]
-    )
-    triangles = np.concatenate([_fan(low[::-1]), _fan(high), sides])
-    return make_mesh(name, vertices, triangles)
+    return make_mesh(name, vertices, np.concatenate([_fan(low[::-1]), _fan(high), band(low, high)]))
 
 
 SPECIAL = ("cylinder", "cone", "dome", "doublet")

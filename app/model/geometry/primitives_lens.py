@@ -59,7 +59,7 @@ def _lens_between(
     caps = []
     for vertex_z, radius, conic in (first, second):
         r = _even_arc(radius, conic, aperture, rings)
-        sag, slope = _sag(r, radius, conic)
+        sag, slope = sag_and_slope(r, radius, conic)
         points = np.column_stack([r[radial][:, None] * direction, vertex_z + sag[radial]])
         normals = normalised(np.column_stack([-slope[radial][:, None] * direction, np.ones(len(radial))]))
         caps.append((points, normals))
@@ -101,7 +101,7 @@ def _check_thickness(
     name: str, first: tuple[float, float, float], second: tuple[float, float, float], aperture: float
 ) -> None:
     r = aperture * np.linspace(0.0, 1.0, 257)
-    gap = (second[0] + _sag(r, *second[1:])[0]) - (first[0] + _sag(r, *first[1:])[0])
+    gap = (second[0] + sag_and_slope(r, *second[1:])[0]) - (first[0] + sag_and_slope(r, *first[1:])[0])
     thinnest = int(np.argmin(gap))
     if gap[thinnest] < -1e-12 * aperture or (gap[thinnest] <= 1e-12 * aperture and thinnest != len(r) - 1):
         raise UserError(
@@ -110,8 +110,8 @@ def _check_thickness(
         )
 
 
-def _sag(r: np.ndarray, radius: float, conic: float) -> tuple[np.ndarray, np.ndarray]:
-    """Height of a conic surface above its vertex and its slope dz/dr at distance `r` from the axis."""
+def sag_and_slope(r: np.ndarray, radius: float, conic: float) -> tuple[np.ndarray, np.ndarray]:
+    """Height of a conic surface above its vertex and its slope dz/dr at distances `r` from the axis."""
     curvature = 0.0 if math.isinf(radius) else 1.0 / radius
     root = np.sqrt(np.maximum(0.0, 1.0 - (1.0 + conic) * (curvature * r) ** 2))
     # A hemisphere's rim is vertical: its slope is bounded so that normals stay finite.
@@ -122,7 +122,7 @@ def _even_arc(radius: float, conic: float, aperture: float, rings: int) -> np.nd
     """Radii of the rings 0 … `rings`, evenly spaced along the meridian, float64 (rings + 1,)."""
     # Sampled in sin t, so that the steep end of a hemisphere is resolved.
     r = aperture * np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, 16 * rings + 257))
-    sag, _ = _sag(r, radius, conic)
+    sag, _ = sag_and_slope(r, radius, conic)
     arc = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(r), np.diff(sag)))])
     even = np.interp(np.linspace(0.0, arc[-1], rings + 1), arc, r)
     even[-1] = aperture

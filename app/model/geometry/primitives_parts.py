@@ -41,6 +41,12 @@ def count(shape: str, key: str, value: int, low: int, high: int = MAX_TRIANGLES)
     return int(value)
 
 
+def band(low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Two triangles for each step of two closed rings of vertices, outward for rings counter-clockwise from above."""
+    low_next, high_next = np.roll(low, -1), np.roll(high, -1)
+    return np.concatenate([np.stack([low, low_next, high_next], axis=1), np.stack([low, high_next, high], axis=1)])
+
+
 def with_box_uv(mesh: Mesh) -> Mesh:
     """A box along the axes, centred on the origin, each of whose faces shows the whole picture.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from .mesh import Mesh, make_mesh, normalised
-from .primitives_parts import MAX_TRIANGLES, count, in_range, positive
+from .primitives_parts import MAX_TRIANGLES, band, count, in_range, positive
 
 MAX_HEIGHT = 1e30
 """Beyond it slopes overflow."""
@@ -59,7 +59,7 @@ def height_field(
     # Boundary counter-clockwise from above, and its copy at the bottom.
     boundary = np.concatenate([number[0, :-1], number[:-1, -1], number[-1, :0:-1], number[:0:-1, 0]])
     beneath = nx * ny + np.arange(len(boundary))
-    sides = _band(beneath, boundary)
+    sides = band(beneath, boundary)
     bottom_number = np.full(nx * ny, -1)
     bottom_number[boundary] = beneath
     bottom = _strips(bottom_number.reshape(ny, nx))
@@ -119,12 +119,6 @@ def rippled_water(
         dz_dx += kx * slope
         dz_dy += ky * slope
     return height_field(z, (width, height), depth, (dz_dx, dz_dy), name)
-
-
-def _band(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Two triangles for each step of two closed rings, outward for rings counter-clockwise from above."""
-    low_next, high_next = np.roll(low, -1), np.roll(high, -1)
-    return np.concatenate([np.stack([low, low_next, high_next], axis=1), np.stack([low, high_next, high], axis=1)])
 
 
 def _boundary_normals(nx: int, ny: int) -> np.ndarray:

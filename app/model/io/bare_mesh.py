@@ -124,7 +124,7 @@ def parts_of_mesh(mesh: Mesh, groups: Groups | None) -> list[MeshPart]:
     for triangles in pieces:
         own = groups.of_triangle[triangles]
         name = names.unique(_commonest(own, groups.names) or mesh.name)
-        parts.append(MeshPart(_piece(mesh, triangles, name), _commonest(own, groups.materials)))
+        parts.append(MeshPart(replace(mesh.part(triangles), name=name), _commonest(own, groups.materials)))
     return parts
 
 
@@ -159,15 +159,3 @@ def _with_cavities(mesh: Mesh, of_triangle: np.ndarray) -> np.ndarray:
 
 def _commonest(of_triangle: np.ndarray, values: Sequence[T]) -> T:
     return values[Counter(of_triangle.tolist()).most_common(1)[0][0]]
-
-
-def _piece(mesh: Mesh, triangles: np.ndarray, name: str) -> Mesh:
-    kept, number = np.unique(mesh.triangles[triangles], return_inverse=True)
-    return replace(
-        mesh,
-        name=name,
-        vertices=mesh.vertices[kept],
-        triangles=number.reshape(-1, 3).astype(np.int32),
-        corner_normals=None if mesh.corner_normals is None else mesh.corner_normals[triangles],
-        uv=None if mesh.uv is None else mesh.uv[triangles],
-    )

@@ -16,7 +16,7 @@ from ...base.errors import UserError
 from ..geometry.mesh import Mesh
 from ..lights.light import Light
 from ..lights.light_file import light_values, read_light
-from ..placement import PLACEMENT_KEYS, Surroundings, read_placement
+from ..placement import PLACEMENT_KEYS, Surroundings, angles_deg, read_placement
 from ..scene_objects import rested
 from .scene_table import SceneTable
 
@@ -78,14 +78,7 @@ def _turned(matrix: np.ndarray) -> dict[str, Any]:
         return {}
     if np.linalg.det(linear) < 0.0:
         scale[2] *= -1.0
-    rotation = linear / scale
-    level = float(np.hypot(rotation[0, 0], rotation[1, 0]))
-    y = np.arctan2(-rotation[2, 0], level)
-    if level < 1e-9:
-        x, z = 0.0, np.arctan2(-rotation[0, 1], rotation[1, 1])
-    else:
-        x, z = np.arctan2(rotation[2, 1], rotation[2, 2]), np.arctan2(rotation[1, 0], rotation[0, 0])
-    angles = _tidy(np.degrees([x, y, z]))
+    angles = _tidy(angles_deg(linear / scale))
     values: dict[str, Any] = {}
     if any(angles):
         values["rotation_deg"] = angles

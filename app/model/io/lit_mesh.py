@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import UserError
-from ...base.image_io import write_into
+from ...base.image_io import write_image
 from ...base.tone_map import srgb_oetf
 from ..geometry.mesh_health import weld_map
 from ..staging import Y_UP_TO_Z_UP, UpAxis
@@ -118,7 +118,7 @@ def write_lit_usd(lit: LitMesh, path: Path, into: Path, texture_into: Path) -> N
     check_usd()
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
-    write_into(texture_into, lit.emission)
+    write_image(texture_path(path), lit.emission, into=texture_into)
     # A layer of no file: USD keeps those of files open by their names. "usd" is binary.
     layer = Sdf.Layer.CreateAnonymous(".usda" if path.suffix.lower() == ".usda" else ".usdc")
     stage = Usd.Stage.Open(layer)

@@ -22,6 +22,7 @@ from ...base.errors import UserError
 from ..geometry.mesh import Mesh
 from ..lights.light_file import light_values
 from ..local_dispersion import DABS, describe_dabs
+from ..naming import free_name
 from ..placement import PLACEMENT_KEYS
 from ..scene import Scene, SceneObject
 from ..scene_camera import camera_values
@@ -289,10 +290,7 @@ def _material(item: SceneObject, materials: dict[str, dict[str, Any]], path: Pat
         if known == values:
             return {"material": name}
     stem = str(values.get("name") or values.get("glass") or values.get("kind") or "glass")
-    name, number = stem, 1
-    while name in materials:
-        number += 1
-        name = f"{stem} {number}"
+    name = stem if stem not in materials else free_name(f"{stem} 2", [*materials])
     materials[name] = values
     return {"material": name}
 

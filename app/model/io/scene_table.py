@@ -112,7 +112,7 @@ class SceneTable:
             self.fail(key, f"is {number:g} but must be {limit}")
         return number
 
-    def integer(self, key: str, default: Any = REQUIRED, *, at_least: int, at_most: int) -> int:
+    def integer(self, key: str, default: Any = REQUIRED, *, at_least: float, at_most: float) -> int:
         """A whole number in [at_least, at_most]; 1e6 is accepted as one."""
         number = self.number(key, default, at_least=at_least, at_most=at_most)
         if number != int(number):

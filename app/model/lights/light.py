@@ -17,7 +17,7 @@ from ...base.errors import UserError
 from ..fields import Number, Part
 from ..io.scene_table import MAX_MAGNITUDE
 from ..optics.spectrum import Spectrum
-from ..vectors import Vec3
+from ..vectors import Vec3, unit
 
 if TYPE_CHECKING:
     from .ies_file import Profile
@@ -184,10 +184,9 @@ class Light:
 
     @cached_property
     def _axes(self) -> np.ndarray:
-        axis = np.asarray(self.direction, float) / np.linalg.norm(self.direction)
+        axis = unit(self.direction)
         guide = np.eye(3)[np.argmin(np.abs(axis))] if self.tangent is None else np.asarray(self.tangent, float)
-        first = guide - axis * (guide @ axis)
-        first = first / np.linalg.norm(first)
+        first = unit(guide - axis * (guide @ axis))
         return np.column_stack([first, np.cross(axis, first), axis])
 
     def emits_toward(self, directions: np.ndarray) -> np.ndarray:

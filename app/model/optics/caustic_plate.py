@@ -13,7 +13,9 @@ import numpy as np
 
 from ...base.errors import UserError
 from ..geometry.mesh import Mesh, normalised
+from ..vectors import unit
 from .glass import Dispersion
+from .rough_surfaces import fresnel
 
 SAMPLES = 200_000
 _FLAT = math.cos(math.radians(0.25))
@@ -56,18 +58,18 @@ def plate_of(mesh: Mesh, glass: Dispersion, samples: int = SAMPLES) -> Plate:
     vectors = mesh.area_vectors()
     areas = np.linalg.norm(vectors, axis=1)
     vectors, corners, areas = vectors[areas > 0.0], mesh.corners()[areas > 0.0], areas[areas > 0.0]
-    unit = vectors / areas[:, None]
+    facing = vectors / areas[:, None]
     extent = float(np.linalg.norm(np.subtract(*mesh.bounds()[::-1])))
-    is_flat = _flat_side(unit, areas, corners, extent)
-    inward = -normalised(vectors[is_flat].sum(axis=0, keepdims=True))[0]
+    is_flat = _flat_side(facing, areas, corners, extent)
+    inward = -unit(vectors[is_flat].sum(axis=0))
     frame = _frame(inward)
     local = corners @ frame.T
     low, high = (edge(local[is_flat], axis=(0, 1)) for edge in (np.min, np.max))
     local -= np.array([*(0.5 * (low + high)[:2]), low[2]])
-    unit, vectors = unit @ frame.T, vectors @ frame.T
+    facing, vectors = facing @ frame.T, vectors @ frame.T
     size, flat_area = (high - low)[:2], float(areas[is_flat].sum())
-    shaped = (unit[:, 2] > _STEEP) & ~is_flat
-    behind = (unit[:, 2] < -_STEEP) & ~is_flat
+    shaped = (facing[:, 2] > _STEEP) & ~is_flat
+    behind = (facing[:, 2] < -_STEEP) & ~is_flat
     covered = float(vectors[shaped, 2].sum())
     thickness = float(local[..., 2].max())
     if flat_area < 0.3 * size.prod() or not 0.7 < covered / flat_area < 1.3 or areas[behind].sum() > 0.02 * flat_area:
@@ -76,7 +78,7 @@ def plate_of(mesh: Mesh, glass: Dispersion, samples: int = SAMPLES) -> Plate:
         )
     if thickness > _THICKEST * size.min():
         raise UserError(f"'{mesh.name}' is {thickness:.4g} thick and {size.min():.4g} wide, a block and no plate")
-    if np.ptp(unit[shaped], axis=0).max() < _CURVED:
+    if np.ptp(facing[shaped], axis=0).max() < _CURVED:
         raise UserError(
             f"both sides of '{mesh.name}' are flat, so it casts no picture; give the mesh of the shaped plate"
         )
@@ -100,14 +102,14 @@ def plate_of(mesh: Mesh, glass: Dispersion, samples: int = SAMPLES) -> Plate:
     )
 
 
-def _flat_side(unit: np.ndarray, areas: np.ndarray, corners: np.ndarray, extent: float) -> np.ndarray:
+def _flat_side(facing: np.ndarray, areas: np.ndarray, corners: np.ndarray, extent: float) -> np.ndarray:
     """Which triangles lie in the plane that holds most area, bool (T,)."""
-    keys, of_key = np.unique(np.round(unit, 3), axis=0, return_inverse=True)
+    keys, of_key = np.unique(np.round(facing, 3), axis=0, return_inverse=True)
     by_key = np.bincount(of_key.ravel(), areas, len(keys))
-    best = np.zeros(len(unit), bool)
+    best = np.zeros(len(facing), bool)
     for key in np.argsort(by_key)[::-1][:6]:
-        direction = normalised(keys[key][None])[0]
-        alike = unit @ direction > _FLAT
+        direction = unit(keys[key])
+        alike = facing @ direction > _FLAT
         heights = corners.mean(axis=1) @ direction
         middle = np.median(
             np.repeat(heights[alike], np.maximum(1, (64 * areas[alike] / areas[alike].max()).astype(int)))
@@ -120,7 +122,7 @@ def _flat_side(unit: np.ndarray, areas: np.ndarray, corners: np.ndarray, extent:
 def _frame(z: np.ndarray) -> np.ndarray:
     """Rows x, y, z: a right-handed frame, x the nearest to a coordinate axis."""
     x = np.eye(3)[0 if abs(z[0]) < 0.9 else 1]
-    x = normalised((x - z * (x @ z))[None])[0]
+    x = unit(x - z * (x @ z))
     return np.stack([x, np.cross(z, x), z])
 
 
@@ -184,7 +186,5 @@ def _refracted(direction: np.ndarray, normal: np.ndarray, eta: float) -> tuple[n
     square = 1.0 - eta**2 * (1.0 - cosine**2)
     passes = (square > 0.0) & (cosine > 0.0)
     behind = np.sqrt(np.where(passes, square, 1.0))
-    s = (eta * cosine - behind) / np.where(passes, eta * cosine + behind, 1.0)
-    p = (cosine - eta * behind) / np.where(passes, cosine + eta * behind, 1.0)
     out = eta * direction + (behind - eta * cosine)[:, None] * normal
-    return out, np.where(passes, 1.0 - 0.5 * (s**2 + p**2), 0.0)
+    return out, np.where(passes, 1.0 - fresnel(np.maximum(cosine, 0.0), 1.0 / eta), 0.0)

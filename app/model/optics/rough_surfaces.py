@@ -38,7 +38,8 @@ _LEAST = 0.05
 
 
 def fresnel(cosine: np.ndarray, index: float) -> np.ndarray:
-    """Unpolarised reflectance of a surface of relative index `index`, met at `cosine` from outside."""
+    """Unpolarised reflectance of a surface, met at `cosine`; `index`: that behind it over that before. 1 where light is
+    totally reflected."""
     inside = np.sqrt(np.maximum(1.0 - (1.0 - cosine**2) / index**2, 0.0))
     s = (cosine - index * inside) / np.maximum(cosine + index * inside, 1e-300)
     p = (index * cosine - inside) / np.maximum(index * cosine + inside, 1e-300)
@@ -118,11 +119,8 @@ def glass_sent_on(alpha: float, eta_it: float, cosine: np.ndarray) -> np.ndarray
     turn = np.pi * (np.arange(turns)[None, :] + 0.5) / turns  # the other half is alike
     weights, facing, height, length = _visible_normals(alpha, mu, 44, turn)
     facing, upright = np.clip(facing, 0.0, 1.0), height / length
-    cosine2 = 1.0 - eta_it**2 * (1.0 - facing**2)
-    passes, inside = cosine2 > 0.0, np.sqrt(np.maximum(cosine2, 0.0))
-    s = (eta_it * facing - inside) / np.maximum(eta_it * facing + inside, 1e-300)
-    p = (facing - eta_it * inside) / np.maximum(facing + eta_it * inside, 1e-300)
-    reflectance = np.where(passes, 0.5 * (s * s + p * p), 1.0)
+    inside = np.sqrt(np.maximum(1.0 - eta_it**2 * (1.0 - facing**2), 0.0))
+    reflectance = fresnel(facing, 1.0 / eta_it)
     up = 2.0 * facing * upright - mu
     down = eta_it * mu - (eta_it * facing - inside) * upright
     sent = reflectance * _unhidden(alpha, up) + (1.0 - reflectance) * _unhidden(alpha, down)
