@@ -35,6 +35,13 @@ def check_scene(scene: object) -> None:
         raise UserError(f"{type(scene).__name__} is no scene: open one with spectrasplat.load, for example")
 
 
+def whole(name: str, value: object, low: int, high: int) -> int:
+    """`value` where it is a whole number within these ends; raises `UserError` otherwise."""
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise UserError(f"{name}: {value!r} is out of range: give a whole number from {low} to {high:,}")
+    return value
+
+
 def in_python(sentence: str) -> str:
     """A sentence about options of the command line, about arguments of the same name."""
     return re.sub(r"--([a-z]+(?:-[a-z]+)*)", lambda found: found[1].replace("-", "_"), sentence)

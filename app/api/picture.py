@@ -77,13 +77,12 @@ class _Image:
         target = Path(path)
         if target.suffix.lower() != suffix:
             raise UserError(f"cannot write {target}: the name must end in {suffix}")
-        edges = self.bin_edges_nm
         write_image(
             target,
             rgb,
             exposure_ev=exposure_ev,
             spectral=spectral,
-            bin_edges_nm=edges,
+            bin_edges_nm=self.bin_edges_nm,
             glare=glare,
             antialias=antialias,
         )
@@ -108,8 +107,8 @@ class Picture(_Image):
 
         Raises `UserError` where it cannot be written.
         """
-        stops, antialias = self._stops(exposure_ev), self.antialias_highlights
-        return self._write(path, ".png", self._layer(layer), stops, None, self.glare, antialias)
+        stops = self.exposure_ev if exposure_ev is None else exposure_ev
+        return self._write(path, ".png", self._layer(layer), stops, None, self.glare, self.antialias_highlights)
 
     def _repr_png_(self) -> bytes:
         """As notebooks show it."""
@@ -122,9 +121,6 @@ class Picture(_Image):
             known = ", ".join(f"'{layer}'" for layer in self.layers)
             raise UserError(f"the picture has no layer '{name}'{suggestion(name, self.layers)}; it has {known}")
         return self.layers[name]
-
-    def _stops(self, exposure_ev: float | None) -> float:
-        return self.exposure_ev if exposure_ev is None else exposure_ev
 
     def __repr__(self) -> str:
         width, height = self.size

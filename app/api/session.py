@@ -16,7 +16,7 @@ import numpy as np
 from ..base.errors import UserError
 from ..base.not_yet import NotYet
 from ..edit.stored_photons import StoredPhotons
-from .arguments import Count, Size, settings_of
+from .arguments import Count, Size, settings_of, whole
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene
@@ -133,8 +133,8 @@ class Session:
             share = len(found.flux_w) / max(len(chosen.flux_w), 1)
             return replace(chosen, flux_w=chosen.flux_w * share / (self._settings.photons or 1))
 
-        if limit is not None and (isinstance(limit, bool) or not isinstance(limit, int) or limit < 1):
-            raise UserError(f"limit {limit!r} is no number of photons: give 1 or more")
+        if limit is not None:
+            whole("limit", limit, 1, _ALL)
         return self._running.run(work, progress, cancel)
 
     def view(self) -> View:

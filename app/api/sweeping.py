@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from queue import SimpleQueue
 from typing import TYPE_CHECKING
 
-from ..base.errors import UserError
+from ..commands.table import MAX_WORKERS
 from ..edit.parameters import Stage
-from .arguments import Count, Size, settings_of
+from .arguments import Count, Size, settings_of, whole
 from .device import Cancel, Device, Progress
 from .picture import Picture, Statistics
 from .scene import Scene
@@ -62,8 +62,7 @@ def sweep(
     from ..render.sweep import SweepPlan, check_values, points_of
 
     settings = settings_of(scene, size=size, photons=photons, seed=seed, method=method, bins=bins, spp=spp)
-    if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
-        raise UserError(f"workers {workers!r} is no number of processes: give 1 or more")
+    whole("workers", workers, 1, MAX_WORKERS)
     model = scene._model
     start = Stage(model, model.camera, settings.exposure_ev or 0.0)
     grid = {path: tuple(float(value) for value in values) for path, values in parameters.items()}

@@ -12,6 +12,7 @@ import numpy as np
 from ..base.errors import UserError, suggestion
 from ..model.geometry.mesh import Mesh, note_recipe
 from ..model.materials.material import Material
+from ..model.naming import place_of
 from ..model.scene_objects import load_checked_mesh
 from ..model.texture import Environment
 
@@ -138,13 +139,9 @@ class Entries:
 
     def _index(self, name: str | int) -> int:
         names = self.names
-        if isinstance(name, str) and name in names:
-            return names.index(name)
         if isinstance(name, int) and not isinstance(name, bool) and -len(names) <= name < len(names):
             return name % len(names)
-        kind, listed = self._key[:-1], ", ".join(f"'{n}'" for n in names) or "none"
-        hint = suggestion(name, names) if isinstance(name, str) else ""
-        raise UserError(f"scene '{self._scene.name}' has no {kind} {name!r}{hint}; it has {listed}")
+        return place_of(name, names, f"scene '{self._scene.name}' has no {self._key[:-1]}")
 
     def __repr__(self) -> str:
         return f"{self._key}: {', '.join(self.names)}"

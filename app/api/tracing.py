@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from ..base.errors import UserError
 from ..edit.stored_photons import StoredPhotons
 from ..model.naming import place_of
-from .arguments import Count, check_scene
+from ..model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
+from .arguments import Count, check_scene, whole
 from .device import Cancel, Device, Progress
 from .scene import Scene
 from .session import Session
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from ..gpu.context import Context
 
 MAX_RAYS, MAX_REFLECTIONS = 100_000, 20
-LINES_NM = (486.1327, 587.5618, 656.2725)
-"""Fraunhofer F, d and C."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ def fan(
     *,
     light: str | None = None,
     rays: int = 9,
-    wavelengths_nm: Sequence[float] = LINES_NM,
+    wavelengths_nm: Sequence[float] = (LINE_F_NM, LINE_D_NM, LINE_C_NM),
     reflections: int = 0,
 ) -> Fan:
     """Rays from a light (default: that which shines on it most) through object `through`, spread in the plane in which
@@ -89,12 +88,10 @@ def fan(
     if light is not None:
         source = place_of(light, [item.name for item in model.lights], f"scene '{model.name}' has no light")
     nm = np.asarray(wavelengths_nm, np.float64).reshape(-1)
-    if isinstance(rays, bool) or not isinstance(rays, int) or not 1 <= rays * max(len(nm), 1) <= MAX_RAYS:
-        raise UserError(f"rays {rays!r} times {len(nm)} wavelengths is out of range: give 1 to {MAX_RAYS} in all")
     if not len(nm) or not ((nm >= 380.0) & (nm <= 780.0)).all():
         raise UserError("wavelengths_nm must be one or more wavelengths between 380 and 780 nm")
-    if isinstance(reflections, bool) or not isinstance(reflections, int) or not 0 <= reflections <= MAX_REFLECTIONS:
-        raise UserError(f"reflections {reflections!r} is out of range: give 0 to {MAX_REFLECTIONS}")
+    whole(f"rays, at {len(nm)} wavelengths", rays, 1, MAX_RAYS // len(nm))
+    whole("reflections", reflections, 0, MAX_REFLECTIONS)
 
     def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Fan:
         from ..model.settings import RenderSettings

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from ..base.errors import UserError
 from ..edit import camera_controls
-from ..model.scene import Camera
 from ..model.scene_camera import camera_values
 from .device import Device
 from .pages import page
@@ -44,7 +43,7 @@ _FIRST_S = 30.0
 _PAGE_AFTER_S = 3.0
 """The page that stays in a saved notebook is made when nothing has moved for so long."""
 PAGE_SIZE, PAGE_PHOTONS = (480, 270), 20_000
-"""Of that page, which every saving of the notebook writes."""
+"""Size and photons of that page, which every saving of the notebook writes."""
 
 
 class Viewed(Protocol):
@@ -152,11 +151,7 @@ class View:
             case _:
                 return
         self._moved_s = time.monotonic()
-        self._look(camera)
-
-    def _look(self, camera: Camera) -> None:
-        values = camera_values(camera)
-        self._session.scene.camera.update(**values)
+        self._session.scene.camera.update(**camera_values(camera))
 
     # ---- the thread --------------------------------------------------------------------------
 

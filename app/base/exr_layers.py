@@ -18,7 +18,7 @@ from .errors import UserError
 from .primaries import XYZ, to_rec709
 
 MAX_VALUES = 1 << 28
-"""Of all channels of all parts; 1 GB as float32."""
+"""Most values of all channels of all parts; 1 GB as float32."""
 _USUAL = ("combined", "composite", "rgba", "rgb", "beauty", "color", "colour", "image")
 """What programs call the layer that is the finished picture."""
 

@@ -30,7 +30,7 @@ STEEPNESS = 4.0
 """A side is flat where its own slope is this much less than the way to the pixel."""
 
 GLINT_SPREAD = 0.135
-"""Of what is shown of a pixel that is overexposed alone, on those beside it: a Gaussian of half a pixel."""
+"""Share of a pixel overexposed alone that is shown on each of those beside it: a Gaussian of half a pixel."""
 
 
 def largest_channel(rgb: np.ndarray) -> np.ndarray:
@@ -40,7 +40,7 @@ def largest_channel(rgb: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Glints:
-    """Of n sides of pixels within small groups that are overexposed."""
+    """n sides of pixels within small groups that are overexposed."""
 
     rows: np.ndarray
     columns: np.ndarray
@@ -92,7 +92,7 @@ def _darkest(norm: np.ndarray, rows: np.ndarray, columns: np.ndarray, way: tuple
 
 @dataclass(frozen=True)
 class Steps:
-    """Of n pixels, each with a step in it."""
+    """n pixels, each with a step in it."""
 
     rows: np.ndarray
     columns: np.ndarray

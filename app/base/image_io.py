@@ -32,7 +32,7 @@ from .primaries import REC709
 from .tone_map import auto_exposure, srgb_eotf, tone_map_8bit
 
 MAX_PIXELS = 1 << 26
-"""Of a picture that is read; 805 MB as float32: a mistake rather than a wish."""
+"""Largest picture that is read; 805 MB as float32: a mistake rather than a wish."""
 _HUGE = 1e30
 """Radiance beyond which sums may be more than float32 holds."""
 
@@ -68,7 +68,7 @@ class PictureFormat:
     """A kind of picture file."""
 
     suffixes: tuple[str, ...]
-    """Of its files; the first is offered."""
+    """Suffixes of its files; the first is offered."""
     write: Callable[[Path | io.BytesIO, np.ndarray, Extras], None]
     """Gets sRGB codes, uint8 (H, W, 3), of a picture to look at, and float32 linear Rec.709 otherwise."""
     read: Callable[[Path, str], Picture] | None = None

@@ -30,7 +30,7 @@ class KeptFiles:
     """Bytes of one, packed and unpacked."""
     most_files: int | None = None
     most_bytes: int | None = None
-    """Of all of them, packed."""
+    """Bytes of all of them, packed."""
     level: int = 1
     """zlib's, 0 to 9: 0 for what is large and hardly gets smaller."""
 

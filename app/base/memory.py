@@ -14,7 +14,7 @@ MAX_SIDE_PX = 16384
 """Largest texture side OpenGL 4.3 promises."""
 _TEXEL_BYTES = 16  # RGBA32F
 _LISTED_BYTES, _SURVEYED_BYTES = 4, 20
-"""Of a pixel that sees glass, and of one that is surveyed, where one texture holds the sums."""
+"""More for a pixel that sees glass, and for one that is surveyed, where one texture holds the sums."""
 _GIB, _MIB = 1 << 30, 1 << 20
 _LEAST_BYTES = 160 * _MIB
 """What any rendering takes beyond the interpreter: OpenGL and its compiler, programs, the queue of photons."""

@@ -215,7 +215,7 @@ class Frames:
                 claim.unlink(missing_ok=True)
 
     def path(self, index: int) -> Path:
-        """Of a frame."""
+        """The file of a frame."""
         return self._folder / frame_name(index, self._suffix)
 
     def write(self, index: int, codes: np.ndarray) -> None:
@@ -271,7 +271,7 @@ Sink = Film | Frames
 
 
 def frame_name(index: int, suffix: str) -> str:
-    """Of a frame's file."""
+    """What a frame's file is called."""
     return f"{index:0{_DIGITS}}{suffix}"
 
 

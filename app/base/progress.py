@@ -20,13 +20,13 @@ SHOW_AFTER_S = 2.0
 LOG_EVERY_S = 10.0
 _BAR_EVERY_S = 0.05
 _MARK_EVERY = 0.01
-"""Of a phase's time."""
+"""Share of a phase's time between two marks."""
 _OBSERVED_S = 2.0
 """For which a part of the work must have gone on evenly before the time left is foretold: …"""
 _EVEN = 1.5
 """… its rates before and after the middle of that time within this factor."""
 _LEAST = 1e-3
-"""Of the whole, that has been done by then."""
+"""Share of the whole that has been done by then."""
 _UNKNOWN = 0.15
 """Share of what is left, that parts of the work whose rate nobody knows yet may be."""
 

@@ -12,7 +12,7 @@ from ..model.gems.report import PICTURES, GemReport
 from ..model.io.scene_pictures import png_bytes
 
 _COLOURS = ("srd-lambda", "srd", "progressive")
-"""Of the curves, among those of every report."""
+"""Colours of the curves, among those of every report."""
 
 
 def page(found: GemReport) -> str:

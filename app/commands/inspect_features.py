@@ -59,7 +59,7 @@ def _record_sizes(features: Features) -> tuple[int, int]:
 
 
 class Proof(NamedTuple):
-    """Of one feature."""
+    """Where the names of one feature were found."""
 
     feature: str
     included: bool

@@ -33,7 +33,7 @@ HEADINGS = (
     "array words",
     "driver s",
 )
-"""Of a table of programs; numbers but for the first."""
+"""Columns of a table of programs; numbers but for the first."""
 
 
 @dataclass(frozen=True)

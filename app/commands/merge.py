@@ -90,7 +90,7 @@ def _merge_to_part(options: Merge) -> int:
 
 
 def _headers(options: Merge) -> dict[Path, PartHeader]:
-    """Of all files that are given, each once. Raises `UserError`."""
+    """Headers of all files that are given, each once. Raises `UserError`."""
     from ..render.part_file import SUFFIX, read_header
 
     paths: list[Path] = []

@@ -198,7 +198,7 @@ class _Run:
     """The part's own; beyond it something is wrong, unless it only measures."""
     measures: bool
     left_s: float
-    """Of the whole."""
+    """Time left for the whole."""
     tell: Callable[[float], None]
     """Gets the share done."""
     note: Callable[[Finding], None]

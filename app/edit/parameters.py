@@ -114,7 +114,7 @@ def paths(scene: Scene, camera: Camera) -> dict[str, Parameter]:
 
 
 def _of_glass(material: Material) -> dict[str, Parameter]:
-    """Of a crystal, which has two indices, the gain alone."""
+    """The parameters of a glass; of a crystal, which has two indices, the gain alone."""
     if not material.transmits:
         return {}
     return {name: each for name, each in _GLASS.items() if name == "dispersion_gain" or not material.is_crystal}

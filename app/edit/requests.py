@@ -210,7 +210,7 @@ class MatchGlass(Request):
     """… there: two ends of a line or three corners, world; of the light as it is, empty for the first flat receiver."""
     of: tuple[str, ...] = ()
     photons: int = 100_000
-    """Of each glass that is tried."""
+    """Photons of each glass that is tried."""
 
 
 @dataclass(frozen=True)

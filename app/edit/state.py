@@ -95,7 +95,7 @@ class Solve:
     parameter: str = ""
     """By which a derivative is wanted."""
     wanted: Literal["light", "picture", "width"] = "light"
-    """Of a glass: the light as it is, a picture where the ruler lies, or a width along it."""
+    """What a glass is to throw: the light as it is, a picture where the ruler lies, or a width along it."""
     file: Path | None = None
     width: float = 0.0
     with_glass: bool = False

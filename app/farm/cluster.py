@@ -130,7 +130,7 @@ class LocalWorkers:
 
     @property
     def process_ids(self) -> list[int]:
-        """Of the workers."""
+        """Process numbers of the workers."""
         return [worker.process.pid for worker in self._processes]
 
     def environment(self, number: int) -> dict[str, str]:
@@ -210,7 +210,7 @@ class DaskCrew:
         self.client.subscribe_topic(self._topic, self._heard)
 
     def clock(self) -> float:
-        """Of this process."""
+        """Seconds of this process."""
         return time.monotonic()
 
     def size(self) -> int:

@@ -23,11 +23,11 @@ from ..base.errors import UserError
 from ..base.locks import locked
 
 TRIES = 3
-"""Of a task that fails with what is no sentence to the user."""
+"""Times that a task is tried that fails with what is no sentence to the user."""
 LATE = 2.0
 """A task is late that has run so many times as long as half of its kind did."""
 COPIES = 3
-"""Of one task at once, at most: a copy may be late too."""
+"""Copies of one task at once, at most: a copy may be late too."""
 ENOUGH = 3
 """Tasks of a kind that must be done before one is called late."""
 _WORTH_S = 3.0
@@ -124,7 +124,7 @@ class Tally:
     copied: int = 0
     """Further copies that were begun."""
     seconds: dict[str, list[float]] = field(default_factory=dict)
-    """Of every task that was done, by its kind."""
+    """Seconds of every task that was done, by its kind."""
 
 
 class Foreman:

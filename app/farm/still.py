@@ -36,7 +36,7 @@ PARTS_A_WORKER = 4
 """Few enough that each one's preparations count little, enough that the last ones end together."""
 FIRST_PREVIEW_S = 10.0
 PREVIEW_SHARE = 0.05
-"""Of all the time there is, at most, for previews."""
+"""Share of all time that previews may take."""
 _COUNT, _PART, _PREVIEW, _PICTURE = "the count of parts", "part", "preview", "the picture"
 
 
@@ -146,19 +146,19 @@ class PartFolder:
 
     folder: Path
     key: str
-    """Of the rendering."""
+    """Key of the rendering."""
     headers: list[PartHeader] = field(default_factory=list)
-    """Of what is summed up."""
+    """Headers of what is summed up."""
     sums: list[np.ndarray] = field(default_factory=list)
     """Float64 (height, width, 4) for every texture."""
     size_bytes: int = 0
-    """Of all files."""
+    """Bytes of all files."""
     seconds: float = 0.0
     """Spent on writing, reading and adding."""
 
     @property
     def indices(self) -> set[int]:
-        """Of all parts that are there."""
+        """Numbers of all parts that are there."""
         return {index for header in self.headers for index in header.indices}
 
     @property

@@ -31,8 +31,8 @@ def scene_media(scene: Scene) -> list[Dispersion]:
 
 
 def film_stacks(scene: Scene) -> dict[int, tuple[Stack | None, ...]]:
-    """Of each object that has a film: in air, and in each medium that some film touches or lies in, in the order of
-    `scene_media` (None: not this one)."""
+    """By object that has a film, its stacks: in air, and in each medium that some film touches or lies in, in the order
+    of `scene_media` (None: not this one)."""
     films = {i: item.material for i, item in enumerate(scene.objects) if item.material.film is not None}
     touched = {i: set[Dispersion]() for i in films}
     for pair in nested_pairs(scene) + contacts(scene) if films else ():
@@ -65,7 +65,7 @@ class FilmTables:
 
 
 def film_tables(scene: Scene, nm: np.ndarray, polarised: bool) -> FilmTables:
-    """Of wavelengths at even steps of x. Raises UserError where there are too many."""
+    """Tables for wavelengths at even steps of x. Raises UserError where there are too many."""
     stacks = film_stacks(scene)
     absorbs = any(stack.film.absorbs for of in stacks.values() for stack in of if stack)
     below, is_alone = absorbs or polarised, not (absorbs or polarised)

@@ -27,7 +27,7 @@ _STEPS = np.linspace(0.0, 1.0, 1025)
 _ALONG_X = np.array([(0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0)])
 """Turns the lens's axis z to x, and its x up."""
 _TOLERANCE = 1e-7
-"""Of places, as a share of a lens's size."""
+"""How far places that are one may be apart, as a share of a lens's size."""
 
 
 def scene_of_lens(lens: Lens) -> Scene:
@@ -179,7 +179,7 @@ def lens_in(scene: Scene, name: str | None = None) -> Lens:
 
 
 def _sizes(item: SceneObject) -> dict[str, float]:
-    """Of a lens; empty for anything else."""
+    """The sizes of a lens; empty for anything else."""
     recipe, material = item.mesh.recipe or {}, item.material
     is_lens = recipe.get("shape") == "lens" and material.is_solid and material.transmits
     return {"radius1": 1.0, "radius2": -1.0, "thickness": 0.3, "diameter": 1.0, **recipe} if is_lens else {}

@@ -53,9 +53,9 @@ def listed(names: Sequence[str], most: int = 6) -> str:
     return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
 
 
-def place_of(name: str, names: Sequence[str], sentence: str) -> int:
-    """Of `name` among `names`. Raises `UserError`, which begins with `sentence`, as "scene 'a' has no object"."""
-    if name not in names:
+def place_of(name: object, names: Sequence[str], sentence: str) -> int:
+    """Where `name` is among `names`. Raises `UserError`, which begins with `sentence`, as "scene 'a' has no object"."""
+    if not isinstance(name, str) or name not in names:
         hint = suggestion(name, names) if isinstance(name, str) else ""
         raise UserError(f"{sentence} {name!r}{hint or ';'} it has {listed(names) or 'none'}")
     return names.index(name)

@@ -14,7 +14,7 @@ from .optics.caustic_plate import Plate, landing, plate_of
 from .optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
 
 PIXELS = 96
-"""Of the longer side at which pictures are compared."""
+"""Pixels of the longer side at which pictures are compared."""
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _ALIGNED = 40_000
 """Samples by which pictures are brought into line."""
@@ -64,7 +64,7 @@ class PlateReport:
     """Share of the light on the plate that lands in the picture."""
     transmitted: float
     width: float
-    """Of the picture on the screen."""
+    """Width of the picture on the screen."""
     blur: float
     """Root mean square distance between where F and C light of a place of the plate land."""
     nearer: float

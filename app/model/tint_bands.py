@@ -32,7 +32,7 @@ _MIRRORS = (1, 4)
 _ONTO_GRATINGS = ((0.0, 0.0, -1.0), (0.5, 0.0, -0.866), (-0.5, 0.0, -0.866))
 """Directions that light meets a grating in, as of `Grating.shares`."""
 _LEAST_RIPPLE = 1e-3
-"""Of a film's curve: what it reflects, however little, is a colour."""
+"""Least height of a film's curve that counts: what it reflects, however little, is a colour."""
 _BRIGHTENED = 0.5
 """Share of the wanted tolerance by which the light's brightness may be off where footprints are so broad that all
 wavelengths of a band have one weight; twice `TOLERANCE` at least, for few are.

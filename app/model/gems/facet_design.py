@@ -44,7 +44,7 @@ class Tier:
 
     angle_deg: float
     distance: float
-    """Of the planes from the origin."""
+    """Distance of the planes from the origin."""
     indices: tuple[float, ...]
     """Positions on the gear, whole ones as a rule; of a table or culet one that means nothing."""
     name: str = ""
@@ -201,7 +201,7 @@ class _Record(NamedTuple):
         return int(teeth), location
 
     def refractive_index(self) -> float:
-        """Of the stone."""
+        """The index of the stone."""
         (index,) = self.numbers(self.words, 1, (1.54,))
         if not _LEAST_INDEX < index <= _MOST_INDEX:
             self.fail(f"a refractive index of {index:g} is none of a stone; I 1.54 is that of quartz")

@@ -24,7 +24,7 @@ ASET_HEAD_DEG = 15.0
 PUPIL_RAD = 0.01
 """An eye's pupil of 3 mm seen from 300 mm: of light spread wider it takes in one colour at a time."""
 _NUDGE_DEG = 3.0
-"""Of the hand that holds the stone, for scintillation."""
+"""Turn of the hand that holds the stone, for scintillation."""
 _WINDOW, _DARK = 0.5, 0.25
 """Shares of a place's light: more comes from behind, less from before and beside the head."""
 LEAST = 1e-4
@@ -57,7 +57,7 @@ class Stone:
 
     @property
     def name(self) -> str:
-        """Of its mesh."""
+        """What its mesh is called."""
         return self.mesh.name
 
     @cached_property
@@ -67,7 +67,7 @@ class Stone:
 
     @cached_property
     def radius(self) -> float:
-        """Of the circle round it, as seen from above."""
+        """Radius of the circle round it, as seen from above."""
         return float(np.linalg.norm(self.corners[..., :2], axis=-1).max())
 
 

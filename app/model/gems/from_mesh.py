@@ -71,7 +71,7 @@ def _ways_to_look(item: SceneObject) -> list[Mesh]:
 
 
 def _centroid(mesh: Mesh) -> np.ndarray:
-    """Of the solid, float64 (3,)."""
+    """Middle of the solid, float64 (3,)."""
     middle = 0.5 * np.add(*mesh.bounds())
     corners = mesh.corners() - middle
     volumes = np.einsum("ij,ij->i", corners[:, 0], mesh.area_vectors())

@@ -21,7 +21,7 @@ from .figures import Stone, stone_of
 TABLE = "table"
 AXES = ("z", "-z", "x", "-x", "y", "-y")
 _HEIGHT, _WIDTH = 2.0, 10.0
-"""Of the stone above the table and of the table, diameters of the stone."""
+"""How high the stone is above the table and how wide that is, diameters of the stone."""
 _LEAN_DEG = 12.0
 """By which the stone hangs askew, so that its two halves throw different light."""
 

@@ -36,7 +36,7 @@ _MATERIALS = (
 )
 """What designs are made for."""
 _NEAR = 0.02
-"""Of indices: designers write 1.54, 1.62, 1.76."""
+"""Difference of indices that are one: designers write 1.54, 1.62, 1.76."""
 _NAMED = 4
 
 

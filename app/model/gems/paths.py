@@ -21,14 +21,14 @@ the head, up to 45° from the viewer, down to the girdle's plane, from behind it
 REST = 5
 """… or were not followed. These six add up to 1."""
 COSINE, COSINE_HEAD, SPREAD, SEEN = 6, 7, 8, 9
-"""Of what comes from before the girdle's plane through the stone: the sum by the cosine to the viewer, that within the
-angle of the head, the sum by the angle between F and C, and what has more of that than the eye's pupil."""
+"""Sums over what comes from before the girdle's plane through the stone: by the cosine to the viewer, that within the
+angle of the head, by the angle between F and C, and what has more of that than the eye's pupil."""
 COLUMNS = 10
 MOST_EVENTS = 1000
 """Facets that one ray's light meets, with all of its parts."""
 _STACK = 64
 _NEAR = 1e-12
-"""Of the stone's size: nearer than that a ray is still on the facet that it left."""
+"""Share of the stone's size: nearer than that a ray is still on the facet that it left."""
 _WIDER = 1e-6
 """By which boxes are wider than single precision made them."""
 

@@ -25,7 +25,7 @@ from ..vectors import frozen
 MAX_CONVEX_PLANES = 96
 """Enough for a brilliant with a faceted girdle (73)."""
 MAX_FLAT_FACES = 12
-"""Of an object: each has maps of its own, however few pixels see it."""
+"""Flat faces of an object, at most: each has maps of its own, however few pixels see it."""
 # Files hold float32 coordinates (1.2e-7 relative); a plane through them is known to a few times that.
 _COPLANAR_TOLERANCE = 2e-6
 _COPLANAR_COSINE = 0.9999
@@ -144,7 +144,7 @@ class Mesh:
         )
 
     def determinant(self, matrix: np.ndarray) -> float:
-        """Of a transform of the mesh; negative where it mirrors. Raises UserError where it is singular."""
+        """Determinant of a transform of the mesh; negative where it mirrors. Raises UserError where it is singular."""
         linear = matrix[:3, :3]
         determinant = float(np.linalg.det(linear))
         if not np.isfinite(matrix).all() or abs(determinant) <= 1e-30 * np.linalg.norm(linear) ** 3:

@@ -102,6 +102,14 @@ def weld_map(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first[rank], place[inverse.reshape(-1)]
 
 
+def welded_corners(columns: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Vertices of triangles whose corners have several values: `columns`, (T, 3, n) each, with a row (V, n) for each
+    different set of them, in their own type; and the vertices of the triangles, int64 (T, 3)."""
+    flat = [column.reshape(-1, column.shape[-1]) for column in columns]
+    kept, number = weld_map(np.hstack(flat).astype(np.float64))
+    return [rows[kept] for rows in flat], number.reshape(-1, 3)
+
+
 def seam_map(vertices: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """As `weld_map` of positions (V, 3); borders of `triangles` (T, 3) that lie on each other but for rounding are
     merged too."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from ...base import files
 from ...base.errors import UserError
-from ..geometry.mesh_health import weld_map
+from ..geometry.mesh_health import welded_corners
 
 GLB_MAGIC = b"glTF"
 JSON_CHUNK, BIN_CHUNK = 0x4E4F534A, 0x004E4942
@@ -208,15 +208,13 @@ class Additions:
         """Attributes and indices of triangles (T, 3, 3), whose corners are one vertex where float32 cannot tell them
         apart; `uv` runs down, as in glTF."""
         given = {"POSITION": corners, "NORMAL": normals, "TEXCOORD_0": uv}
-        columns = {name: each.reshape(-1, each.shape[-1]) for name, each in given.items() if each is not None}
-        rows = np.hstack(list(columns.values())).astype("<f4")
-        kept, number = weld_map(rows.astype(np.float64))
-        ends = np.cumsum([each.shape[1] for each in columns.values()])
+        columns = {name: each.astype("<f4") for name, each in given.items() if each is not None}
+        vertices, triangles = welded_corners([*columns.values()])
         attributes = {
             name: self._accessor(values, f"VEC{values.shape[1]}", bounds=name == "POSITION")
-            for name, values in zip(columns, np.split(rows[kept], ends[:-1], axis=1), strict=True)
+            for name, values in zip(columns, vertices, strict=True)
         }
-        return {"attributes": attributes, "indices": self._accessor(number.astype("<u4")[:, None], "SCALAR")}
+        return {"attributes": attributes, "indices": self._accessor(triangles.astype("<u4").reshape(-1, 1), "SCALAR")}
 
     def _accessor(self, values: np.ndarray, kind: str, bounds: bool = False) -> int:
         is_index = values.dtype.kind == "u"

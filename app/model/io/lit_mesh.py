@@ -17,7 +17,7 @@ import numpy as np
 from ...base.errors import UserError
 from ...base.image_io import write_image
 from ...base.tone_map import srgb_oetf
-from ..geometry.mesh_health import weld_map
+from ..geometry.mesh_health import welded_corners
 from ..staging import Y_UP_TO_Z_UP, UpAxis
 from .gltf_document import Additions, GltfDocument, write_document
 from .scene_pictures import png_bytes
@@ -25,7 +25,7 @@ from .scene_pictures import png_bytes
 
 @dataclass(frozen=True)
 class LitMesh:
-    """Corners are those of triangles, one by one; `welded` joins them."""
+    """Corners are those of triangles, one by one."""
 
     name: str
     corners: np.ndarray
@@ -45,18 +45,6 @@ class LitMesh:
     def strength(self) -> float:
         """Radiance that the full value of an 8-bit texture stands for, cd/unit²."""
         return float(self.emission.max()) or 1.0
-
-    def welded(self) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray]:
-        """Positions (n, 3), texture coordinates (n, 2), normals (n, 3) or None, all float32, and triangles uint32
-        (t, 3)."""
-        columns = [self.corners.reshape(-1, 3), self.uv.reshape(-1, 2)]
-        if self.normals is not None:
-            columns.append(self.normals.reshape(-1, 3))
-        rows = np.hstack(columns).astype(np.float32)
-        kept, number = weld_map(rows.astype(np.float64))
-        rows = rows[kept]
-        normals = None if self.normals is None else rows[:, 5:8]
-        return rows[:, :3], rows[:, 3:5], normals, number.astype(np.uint32).reshape(-1, 3)
 
 
 STRENGTH = "KHR_materials_emissive_strength"
@@ -129,15 +117,17 @@ def write_lit_usd(lit: LitMesh, path: Path, into: Path, texture_into: Path) -> N
     place = f"/SpectraSplat/{_identifier(lit.name)}"
     mesh = UsdGeom.Mesh.Define(stage, place)
     mesh.GetPrim().SetDisplayName(lit.name)
-    positions, uv, normals, triangles = lit.welded()
+    normals = [] if lit.normals is None else [lit.normals]
+    columns = [column.astype(np.float32) for column in (lit.corners, lit.uv, *normals)]
+    (positions, uv, *normals), triangles = welded_corners(columns)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(positions))
     mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(np.stack([positions.min(axis=0), positions.max(axis=0)])))
     mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(triangles), 3, np.int32)))
     mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(triangles.ravel().astype(np.int32)))
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateDoubleSidedAttr(True)
-    if normals is not None:
-        mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
+    if normals:
+        mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals[0]))
         mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     st = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.vertex)
     st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(np.stack([uv[:, 0], 1.0 - uv[:, 1]], axis=1))))

@@ -18,7 +18,7 @@ from ...base.paths import MESH_SUFFIXES
 from ..gems.facet_design import SUFFIX as DESIGN_SUFFIX
 from ..gems.facet_design import read_asc
 from ..geometry.mesh import Mesh, make_mesh
-from ..geometry.mesh_health import weld_map
+from ..geometry.mesh_health import welded_corners
 from ..geometry.mesh_normals import with_smooth
 from .mesh_raw import Groups, RawMesh
 
@@ -88,19 +88,12 @@ def save_ply(mesh: Mesh, path: str | os.PathLike[str]) -> None:
     """
     from ...base.atomic import atomic_output
 
-    columns, names = [mesh.vertices[mesh.triangles].reshape(-1, 3)], ["x", "y", "z"]
-    if mesh.corner_normals is not None:
-        columns.append(mesh.corner_normals.reshape(-1, 3))
-        names += ["nx", "ny", "nz"]
-    if mesh.uv is not None:
-        columns.append(mesh.uv.reshape(-1, 2))
-        names += ["s", "t"]
-    if len(columns) == 1:
-        rows, triangles = mesh.vertices, mesh.triangles
-    else:
-        rows = np.hstack(columns)
-        kept, number = weld_map(rows)
-        rows, triangles = rows[kept], number.reshape(-1, 3)
+    rows, triangles, names = mesh.vertices, mesh.triangles, ["x", "y", "z"]
+    more = [each for each in (mesh.corner_normals, mesh.uv) if each is not None]
+    if more:
+        vertices, triangles = welded_corners([mesh.corners(), *more])
+        rows = np.hstack(vertices)
+        names += ["nx", "ny", "nz"] * (mesh.corner_normals is not None) + ["s", "t"] * (mesh.uv is not None)
     faces = np.empty(len(triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, triangles
     header = [

@@ -256,7 +256,7 @@ def _told(value: float) -> str:
 
 
 def _glass(path: Path, listed: _Listed, makers: Sequence[str], notes: list[str]) -> Dispersion | None:
-    """Of the catalogue, by the makers of the file first; "1.5168/64.17" is n_d and V_d, "1.5" an index."""
+    """A glass of the catalogue, by the makers of the file first; "1.5168/64.17" is n_d and V_d, "1.5" an index."""
     name, where = listed.glass.strip(), f"{path.name}, line {listed.line}: glass"
     if name.casefold() in _AIR:
         return None

@@ -87,7 +87,7 @@ class Dielectric(Material):
     """Direction, in the object's own coordinates, in which the film's thickness rises to `film_nm` from …"""
     film_from_nm: float = 0.0
     extraordinary: Dispersion | None = None
-    """Of a uniaxial crystal, whose `dispersion` is the ordinary one; None: it is isotropic."""
+    """The second index of a uniaxial crystal, whose `dispersion` is the ordinary one; None: it is isotropic."""
     axis: Vec3 = Z_AXIS
     """A crystal's optic axis, a unit vector in the object's own coordinates."""
 

@@ -192,7 +192,7 @@ class Grating(Material):
     profile: str = ""
     """One of `PROFILES`, whose shares depend on wavelength and angle; "": `efficiency` has each order's."""
     blaze_nm: float = 550.0
-    """Of facets, the wavelength that all goes into order 1 (`gratings.facet_angle`); below 0: into order -1."""
+    """Wavelength that facets send whole into order 1 (`gratings.facet_angle`); below 0: into order -1."""
     depth_nm: float = 250.0
     open: float = 0.5
     groove_index: float = 1.5

@@ -16,7 +16,7 @@ import numpy as np
 LAST_MINIMUM = 8
 """Up to which a table knows the light of a line."""
 STEPS_BESSEL = 256
-"""Of a period, over which Bessel's integral is summed."""
+"""Parts of a period over which Bessel's integral is summed."""
 
 
 def sawtooth_shares(order: np.ndarray, waves: np.ndarray) -> np.ndarray:
@@ -26,14 +26,14 @@ def sawtooth_shares(order: np.ndarray, waves: np.ndarray) -> np.ndarray:
 
 
 def lamellar_shares(order: np.ndarray, waves: np.ndarray) -> np.ndarray:
-    """Of grooves with steep walls, as wide as the ridges between them; `waves`: their depth, by the light's phase."""
+    """Shares of grooves with steep walls, as wide as the ridges between; `waves`: their depth, by the light's phase."""
     odd = np.asarray(order) % 2 != 0
     others = np.where(order == 0, np.cos(np.pi * waves) ** 2, 0.0)
     return np.where(odd, (2.0 / (np.pi * np.where(odd, order, 1)) * np.sin(np.pi * waves)) ** 2, others)
 
 
 def sinusoidal_shares(order: np.ndarray, waves: np.ndarray) -> np.ndarray:
-    """Of grooves that are a sine's: J_m², by Bessel's integral."""
+    """Shares of grooves that are a sine's: J_m², by Bessel's integral."""
     turn = 2.0 * np.pi * (np.arange(STEPS_BESSEL) + 0.5) / STEPS_BESSEL
     order, waves = np.broadcast_arrays(order, waves)
     phase = order[..., None] * turn - np.pi * waves[..., None] * np.sin(turn)

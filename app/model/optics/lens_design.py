@@ -52,7 +52,7 @@ class Lens:
     name: str
     surfaces: tuple[Surface, ...]
     beam_radius: float | None = None
-    """Of the light that enters; None: as much as passes all surfaces."""
+    """Radius of the light that enters; None: as much as passes all surfaces."""
     wavelengths_nm: tuple[float, ...] = LINES_NM
     reference_nm: float = LINE_D_NM
     """Whose back focus the screen stands at."""
@@ -77,7 +77,7 @@ class LensRow:
     back_focus: float
     """From the last vertex; both infinite where light stays parallel."""
     shift: float
-    """Of the back focus against that of the reference wavelength."""
+    """How far behind the back focus of the reference wavelength its own is."""
     spot: float
     """Root mean square distance from the axis of rays on a screen at the back focus of the reference wavelength."""
     best_shift: float

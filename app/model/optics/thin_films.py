@@ -20,7 +20,7 @@ from .glass import Dispersion, constant
 MAX_LAYERS = 1000
 MAX_NM = 100_000.0
 MAX_VARIED_NM = 20_000.0
-"""Of a film whose thickness varies: one table holds all of its interference, which is finer the thicker it is."""
+"""The same where the thickness varies: one table holds all of the interference, which is finer the thicker it is."""
 _SEEN_NM = 550.0
 ABOVE, BELOW = 128, 32
 """Steps of a table over the cosine outside, from 0 to 1, and over what lies beyond total reflection."""
@@ -52,8 +52,8 @@ class Layer:
 
 
 class Amplitudes(NamedTuple):
-    """Of reflection and transmission for s and p, complex: |a|² is a share of the power. p turns with the ray, so that
-    upright r_p = −r_s."""
+    """Amplitudes of reflection and transmission for s and p, complex: |a|² is a share of the power. p turns with the
+    ray, so that upright r_p = −r_s."""
 
     r_s: np.ndarray
     r_p: np.ndarray
@@ -64,8 +64,8 @@ class Amplitudes(NamedTuple):
 def amplitudes(
     indices: Sequence[np.ndarray], thickness_nm: Sequence[float], sine: np.ndarray, nm: np.ndarray
 ) -> Amplitudes:
-    """Of a stack; `indices` are those of the medium that light comes from, of the layers, and of what is behind, `sine`
-    is the tangential part n sin θ of the direction; all broadcast with the wavelengths `nm`."""
+    """The amplitudes of a stack; `indices` are those of the medium that light comes from, of the layers, and of what is
+    behind, `sine` is the tangential part n sin θ of the direction; all broadcast with the wavelengths `nm`."""
     tangential2 = np.asarray(sine, float) ** 2
     first, last = (_normal_part(index, tangential2) for index in (indices[0], indices[-1]))
     layers = {
