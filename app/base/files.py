@@ -8,6 +8,7 @@ variable SPECTRASPLAT_ALLOW. `docs/threat-model.md` says what that is for.
 
 from __future__ import annotations
 
+import csv
 import errno
 import io
 import os
@@ -21,6 +22,7 @@ from pathlib import Path
 
 import numpy as np
 
+from .errors import UserError
 from .paths import assets_dir
 
 ENVIRONMENT = "SPECTRASPLAT_ALLOW"
@@ -159,6 +161,15 @@ def read_npy(path: str | os.PathLike[str], limit: int = DATA_BYTES) -> np.ndarra
         raise ValueError("it is shorter than its header promises")
     values = np.frombuffer(data, dtype, count, stream.tell())
     return values.reshape(shape[::-1]).T if is_fortran else values.reshape(shape)
+
+
+@contextmanager
+def reading(path: str | os.PathLike[str], remedy: str) -> Iterator[None]:
+    """Within the block, a file that cannot be read is a `UserError` that ends with `remedy`."""
+    try:
+        yield
+    except (OSError, csv.Error) as error:
+        raise UserError(f"cannot read {path}: {reason_of(error)}; {remedy}") from error
 
 
 def reason_of(error: Exception) -> str:

@@ -19,6 +19,7 @@ from click.shell_completion import CompletionItem
 
 from ..base.errors import UserError, suggestion
 from ..base.memory import MAX_SIDE_PX, memory_bytes
+from ..model.fields import Number
 
 Parse = Callable[[str, str], Any]
 """Reads a text: its arguments are the option's flag, for the sentence of a mistake, and the text."""
@@ -272,8 +273,8 @@ def integer(low: int, high: int) -> Parse:
     return parse
 
 
-def number(holds: Callable[[float], bool], range_words: str, example: str) -> Parse:
-    """A number for which `holds`; `range_words` says which those are."""
+def number(limits: Number, example: str) -> Parse:
+    """A number within `limits`."""
 
     def parse(flag: str, text: str) -> float:
         try:
@@ -282,8 +283,8 @@ def number(holds: Callable[[float], bool], range_words: str, example: str) -> Pa
             value = math.nan
         if math.isnan(value):
             raise UserError(f"{flag} '{text}' is not a number, give one{example}")
-        if not holds(value):
-            raise UserError(f"{flag} {text} is out of range: give {range_words}")
+        if not limits.holds(value):
+            raise UserError(f"{flag} {text} is out of range: give {limits.range_words}")
         return value
 
     return parse
@@ -291,7 +292,7 @@ def number(holds: Callable[[float], bool], range_words: str, example: str) -> Pa
 
 def seconds(longest: float = MAX_SECONDS) -> Parse:
     """A time in seconds."""
-    return number(lambda value: 0.0 < value <= longest, f"more than 0 and at most {longest:.0f}", ", for example 3")
+    return number(Number("seconds", above=0.0, at_most=longest), ", for example 3")
 
 
 def one_of(*known: str) -> Parse:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from ..model.fields import Number
 from . import completion, options
 from .options import MISSING, argument, option, setting, shared, target
-from .table import A_LENGTH, BINS, LINEAR, PHOTONS, SEED, SHOWN, SPP, OpensScene, ReadsScenes
+from .table import A_LENGTH, BINS, LINEAR, PHOTONS, POSITIVE, SEED, SHOWN, SPP, OpensScene, ReadsScenes
 
 GRADIENT_SIZE = (256, 256)
 
@@ -31,7 +32,7 @@ class Gradient(OpensScene):
     step: float | None = option(
         "H",
         "Change of the parameter to either side; default: so that the picture changes by about 3 %.",
-        options.number(lambda value: 0.0 < value < 1e9, "more than 0", " in the parameter's unit, for example 0.001"),
+        options.number(POSITIVE, " in the parameter's unit, for example 0.001"),
     )
 
 
@@ -54,7 +55,7 @@ class Wanted(OpensScene):
     width: float | None = option(
         "W",
         "Width of the light along that line, instead of a target: full width at half maximum.",
-        options.number(lambda value: 0.0 < value < 1e9, "more than 0", A_LENGTH),
+        options.number(POSITIVE, A_LENGTH),
     )
     photons: int | None = shared(PHOTONS)
     seed: int | None = shared(SEED)
@@ -94,7 +95,7 @@ class Gem(ReadsScenes):
     head: float = option(
         "DEG",
         "Half the angle at which the viewer's head hides light; default: 15.",
-        options.number(lambda value: 0.0 <= value <= 60.0, "from 0 to 60", " degrees, for example 16"),
+        options.number(Number("head", at_least=0.0, at_most=60.0), " in degrees, for example 16"),
         default=15.0,
     )
     output: Path | None = target(
@@ -118,7 +119,7 @@ class LensTable(ReadsScenes):
     beam: float | None = option(
         "D",
         "Diameter of the parallel light that enters; default: the file's, or all that passes.",
-        options.number(lambda value: 0.0 < value < 1e9, "more than 0", A_LENGTH),
+        options.number(POSITIVE, A_LENGTH),
     )
     wavelengths: tuple[float, ...] | None = option(
         "NM,NM", "Wavelengths; default: the file's, or the lines g, F, e, d and C.", options.wavelengths
@@ -134,7 +135,7 @@ class LensCheck:
     distance: float | None = option(
         "D",
         "From the plate's far side to the screen, in the mesh's unit; default: where it is most like the target.",
-        options.number(lambda value: 0.0 < value < 1e9, "more than 0", " in the mesh's unit, for example 300"),
+        options.number(POSITIVE, " in the mesh's unit, for example 300"),
     )
     output: Path | None = target("OUT", "Write the target and, next to it, what the plate draws.", default=None)
     target: Path = option("PICTURE", "The picture that it was made for.", default=MISSING)

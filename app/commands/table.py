@@ -15,9 +15,10 @@ from ..base import files
 from ..base.errors import UserError
 from ..base.image_io import OFFERED_LINEAR, OFFERED_SHOWN, SPECTRAL_SUFFIXES
 from ..base.movie import FILMS
+from ..model.fields import Number
 from ..model.geometry.mesh_normals import ROUND_DEG
 from ..model.scene_camera import FOCUS_DISTANCE, LENS_RADIUS
-from ..model.scene_render import HAZE, HAZE_ANISOTROPY, MAX_ANISOTROPY, MAX_BOUNCES, MAX_GLARE, MAX_HAZE
+from ..model.scene_render import EXPOSURE_EV, GLARE, HAZE, HAZE_ANISOTROPY, MAX_BOUNCES
 from ..model.settings import CAMERA_METHODS, METHODS
 from . import completion, options
 from .options import MISSING, Option, argument, option, setting, shared, switch, target
@@ -25,17 +26,11 @@ from .options import MISSING, Option, argument, option, setting, shared, switch,
 if TYPE_CHECKING:
     from ..edit.opening import Opening
 
-MAX_EXPOSURE_EV = 64.0
-MAX_FPS = 240.0
 MAX_WORKERS = 1024
 
 # ---- how some options are read ----------------------------------------------------------------
 
-_exposure = options.number(
-    lambda value: abs(value) <= MAX_EXPOSURE_EV,
-    f"between -{MAX_EXPOSURE_EV:.0f} and {MAX_EXPOSURE_EV:.0f} stops",
-    " in stops, for example -1.5",
-)
+_exposure = options.number(EXPOSURE_EV, " in stops, for example -1.5")
 _seed, _spp = options.integer(0, options.MAX_SEED), options.integer(1, options.MAX_SPP)
 _bins = options.integer(options.MIN_BINS, options.MAX_BINS)
 
@@ -49,6 +44,7 @@ _NOT_LINEAR = f"not of {' and '.join(OFFERED_LINEAR)}"
 _SPECTRAL = ", ".join(SPECTRAL_SUFFIXES)
 _FORMATS = tuple(suffix[1:] for suffix in (*OFFERED_SHOWN, *OFFERED_LINEAR))
 A_LENGTH = " a length in the scene's unit, for example 0.05"
+POSITIVE = Number("", above=0.0, below=1e9)
 
 
 def _up(flag: str, text: str) -> str:
@@ -194,20 +190,18 @@ class Render(OpensScene):
     glare: float | None = setting(
         "SHARE",
         f"Share of the light that the lens scatters, 0 to 0.5; {_NOT_LINEAR}.",
-        options.number(
-            lambda value: 0.0 <= value <= MAX_GLARE, f"a share of 0 to {MAX_GLARE:g}", " a share, for example 0.03"
-        ),
+        options.number(GLARE, ", for example 0.03"),
     )
     lens_radius: float | None = option(
         "R",
         "Half the aperture of the camera's lens, scene units: what is out of focus is blurred.",
-        options.number(LENS_RADIUS.holds, f"0 or more and up to {LENS_RADIUS.at_most:g}", A_LENGTH),
+        options.number(LENS_RADIUS, A_LENGTH),
         sets="camera",
     )
     focus_distance: float | None = option(
         "D",
         "From the lens to what is in focus; default: the camera's target.",
-        options.number(FOCUS_DISTANCE.holds, f"more than 0 and up to {FOCUS_DISTANCE.at_most:g}", A_LENGTH),
+        options.number(FOCUS_DISTANCE, A_LENGTH),
         sets="camera",
     )
     max_depth: int | None = setting(
@@ -238,19 +232,13 @@ class Render(OpensScene):
         "K",
         "Haze in which light is seen on its way: what is scattered per scene unit, for example 0.03 (default: as "
         "the scene has it).",
-        options.number(
-            HAZE.holds, f"0 (clear air) to {MAX_HAZE:g} per scene unit", " per scene unit, for example 0.03"
-        ),
+        options.number(HAZE, " per scene unit, for example 0.03"),
         sets="render",
     )
     haze_anisotropy: float | None = option(
         "G",
         "Mean cosine of the angle by which haze scatters, -0.99 to 0.99 (default: as the scene has it).",
-        options.number(
-            HAZE_ANISOTROPY.holds,
-            f"-{MAX_ANISOTROPY:g} to {MAX_ANISOTROPY:g}",
-            " between -0.99 and 0.99, for example 0.3",
-        ),
+        options.number(HAZE_ANISOTROPY, ", for example 0.3"),
         sets="render",
     )
     stats: bool = switch(_STATS)
@@ -299,11 +287,7 @@ class Animate(OpensScene):
     fps: float = option(
         "F",
         "Pictures a second; default: 24.",
-        options.number(
-            lambda value: 0.1 <= value <= MAX_FPS,
-            f"between 0.1 and {MAX_FPS:.0f} frames a second",
-            ", for example 24",
-        ),
+        options.number(Number("fps", at_least=0.1, at_most=240.0), ", for example 24"),
         default=24.0,
     )
     size: tuple[int, int] | None = shared(_SIZE)

@@ -116,6 +116,12 @@ class Number(Field):
         """What `number` must be that it is not, such as "above 0"; None where it lies within the bounds."""
         return broken_limit(number, self.above, self.at_least, self.below, self.at_most)
 
+    @property
+    def range_words(self) -> str:
+        """The bounds, as in "more than 0 and at most 1"."""
+        bounds = {"more than": self.above, "at least": self.at_least, "less than": self.below, "at most": self.at_most}
+        return " and ".join(f"{words} {bound:.7g}" for words, bound in bounds.items() if bound is not None)
+
     def holds(self, number: float) -> bool:
         """Whether `number` lies within the bounds."""
         return self.broken_limit(number) is None

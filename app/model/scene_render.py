@@ -48,6 +48,8 @@ class _Size(Part):
 
 
 _USUAL = RenderDefaults()
+EXPOSURE_EV = Number("exposure_ev", _USUAL.exposure_ev, at_least=-64.0, at_most=64.0)
+GLARE = Number("glare", _USUAL.glare, at_least=0.0, at_most=MAX_GLARE)
 HAZE = Number("haze", _USUAL.haze, optional=True, at_least=0.0, at_most=MAX_HAZE)
 HAZE_ANISOTROPY = Number(
     "haze_anisotropy", _USUAL.haze_anisotropy, optional=True, at_least=-MAX_ANISOTROPY, at_most=MAX_ANISOTROPY
@@ -55,9 +57,9 @@ HAZE_ANISOTROPY = Number(
 _FIELDS = (
     _Size(),
     Integer("photons", _USUAL.photons, at_least=1, at_most=10**12),
-    Number("exposure_ev", _USUAL.exposure_ev, at_least=-64.0, at_most=64.0),
+    EXPOSURE_EV,
     Integer("max_depth", _USUAL.max_depth, at_least=1, at_most=MAX_DEPTH),
-    Number("glare", _USUAL.glare, at_least=0.0, at_most=MAX_GLARE),
+    GLARE,
     Flag("antialias_highlights", _USUAL.antialias_highlights, optional=True),
     Flag("polarisation", _USUAL.polarisation, optional=True),
     Integer("bounces", _USUAL.bounces, optional=True, at_least=0, at_most=MAX_BOUNCES),

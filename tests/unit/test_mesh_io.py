@@ -230,7 +230,7 @@ def test_lying_file_is_one_sentence(tmp_path: Path, name: str) -> None:
 
 
 def test_missing_file_and_bad_crease(tmp_path: Path) -> None:
-    with pytest.raises(UserError, match=r"nothing\.ply: no such mesh file"):
+    with pytest.raises(UserError, match=r"nothing\.ply: No such file"):
         load_mesh(tmp_path / "nothing.ply")
     with pytest.raises(UserError, match="crease angle"):
         load_mesh(_write(tmp_path, "m.obj", TETRAHEDRON_OBJ), smooth=200.0)

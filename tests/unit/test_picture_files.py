@@ -304,7 +304,7 @@ def _written_all_the_same(path: Path, rgb: np.ndarray) -> None:
 
 def test_missing_empty_and_unknown_files_are_refused(tmp_path: Path) -> None:
     for suffix in (".hdr", ".png", ".exr", ".npy", ".jpeg"):
-        assert "there is no such file" in refusal(tmp_path / f"gone{suffix}")
+        assert "No such file" in refusal(tmp_path / f"gone{suffix}")
     np.save(tmp_path / "empty.npy", np.zeros((0, 4, 3), np.float32))
     assert "the picture is empty (4 × 0 pixels)" in refusal(tmp_path / "empty.npy")
     for suffix in (".exr", ".npy"):

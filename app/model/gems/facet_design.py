@@ -122,10 +122,8 @@ def read_asc(path: str | os.PathLike[str]) -> FacetDesign:
     several lines, names of several words and any end of line are read; a preform is refused.
     """
     path = Path(path)
-    try:
+    with files.reading(path, "give a GemCad .asc file"):
         text = files.read_any_text(path, _MAX_BYTES)
-    except OSError as error:
-        raise UserError(f"cannot read the design {path}: {files.reason_of(error)}; give a GemCad .asc file") from error
     read: dict[str, list[_Record]] = {key: [] for key in "agyihf"}
     for record in _records(path, text.replace("\0", "").replace("\x1a", "")):
         if record.key not in read:

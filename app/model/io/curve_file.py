@@ -95,13 +95,10 @@ def read_curves(path: Path, notes: list[str], part: str = "") -> list[Curve]:
     """All curves in `path` whose names hold `part`, at least one; what was assumed goes to `notes`.
 
     Raises UserError with a remedy."""
-    try:
+    with files.reading(path, "give a table of wavelength_nm, value"):
         text = files.read_any_text(path, _MAX_BYTES).replace("\0", "").lstrip("\ufeff \t\r\n")
         is_xml = text.startswith("<")
         rows = [] if is_xml else rows_of(text.splitlines())
-    except (OSError, csv.Error) as error:
-        reason = f"cannot read the curve {path}: {files.reason_of(error)}"
-        raise UserError(f"{reason}; give a table of wavelength_nm, value") from error
     tables = _from_xml(text, path) if is_xml else list(_across(rows)) or _down(path, rows, notes)
     curves: list[Curve] = []
     names: list[str] = []

@@ -229,10 +229,8 @@ class Additions:
 def open_document(path: str | os.PathLike[str]) -> GltfDocument:
     """Open a .glb or .gltf. Raises UserError for anything that is not a valid glTF 2.0 container."""
     path = Path(path)
-    try:
+    with files.reading(path, "check the path and its permissions"):
         data = files.read_bytes(path, files.DATA_BYTES)
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}; check the path and its permissions") from None
     if data[:4] == GLB_MAGIC:
         document = _open_glb(path, data)
     elif path.suffix.lower() == ".glb":

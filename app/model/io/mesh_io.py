@@ -59,12 +59,8 @@ def load_grouped_mesh(path: Path, name: str | None = None) -> tuple[Mesh, Groups
 
 def _read(path: Path) -> RawMesh:
     suffix = path.suffix.lower()
-    try:
+    with files.reading(path, "check the path, which is relative to the scene file"):
         data = files.read_bytes(path, files.DATA_BYTES)
-    except FileNotFoundError:
-        raise UserError(f"{path}: no such mesh file; check the path, which is relative to the scene file") from None
-    except OSError as error:
-        raise UserError(f"{path}: cannot be read ({error.strerror}); check the file and its permissions") from None
     if not data:
         raise UserError(f"{path}: the file is empty; export the mesh again")
     if suffix == ".ply":

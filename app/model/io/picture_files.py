@@ -10,7 +10,6 @@ import io
 import os
 import warnings
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
@@ -44,7 +43,8 @@ def read_picture(path: str | os.PathLike[str]) -> tuple[np.ndarray, tuple[str, .
         held = read_image(path, layer)
         rgb, notes, is_converted = held.rgb, held.notes, held.is_converted
     else:
-        data = _bytes_of(path)
+        with files.reading(path, "check the file and its permissions"):
+            data = files.read_bytes(path, files.DATA_BYTES)
         if suffix in (".hdr", ".pic"):
             from .radiance_hdr import read_hdr
 
@@ -90,15 +90,6 @@ def decode_8bit(data: bytes, where: str) -> tuple[np.ndarray, tuple[str, ...]]:
     except (OSError, ValueError, SyntaxError, EOFError, Image.DecompressionBombError) as error:
         raise UserError(f"{where}: the picture is damaged ({error}); copy or export it again") from error
     return _decoded_levels()[encoded], notes
-
-
-def _bytes_of(path: Path) -> bytes:
-    try:
-        return files.read_bytes(path, files.DATA_BYTES)
-    except FileNotFoundError:
-        raise UserError(f"cannot read {path}: there is no such file; check the name") from None
-    except OSError as error:
-        raise UserError(f"cannot read {path}: {error.strerror}; check the file and its permissions") from None
 
 
 def _transparency(image, where: str) -> tuple[str, ...]:

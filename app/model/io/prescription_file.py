@@ -5,7 +5,6 @@ What such a file may hold and this program cannot draw is refused with its line,
 
 from __future__ import annotations
 
-import csv
 import math
 import os
 import re
@@ -61,11 +60,9 @@ class _Listed(NamedTuple):
 def read_prescription(path: str | os.PathLike[str]) -> Lens:
     """The lens in a .csv or .zmx file. Raises `UserError` with line, key and remedy for what is not understood."""
     path = Path(path)
-    try:
+    with files.reading(path, "give a .csv or .zmx file"):
         text = files.read_any_text(path, _MAX_BYTES).replace("\0", "")
         rows = rows_of(text.splitlines()) if path.suffix.lower() == ".csv" else []
-    except (OSError, csv.Error) as error:
-        raise UserError(f"cannot read the lens {path}: {files.reason_of(error)}; give a .csv or .zmx file") from error
     return _from_table(path, rows) if path.suffix.lower() == ".csv" else _from_zemax(path, text)
 
 

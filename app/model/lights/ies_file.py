@@ -117,16 +117,14 @@ def default_profile() -> Profile:
 def read_ies(path: str | os.PathLike[str]) -> Profile:
     """The profile in `path`. Raises UserError, one sentence with the file and a remedy, for what cannot be used."""
     path = Path(path)
-    try:
-        if not files.is_file(path):
-            raise UserError(f"{path} is not a file; choose a .ies or .ldt file")
+    if not files.is_file(path):
+        raise UserError(f"{path} is not a file; choose a .ies or .ldt file")
+    with files.reading(path, "choose another file"):
         if path.stat().st_size > MAX_BYTES:
             raise UserError(
                 f"{path} is longer than {MAX_BYTES >> 20} MiB, as no lamp's file is; choose a .ies or .ldt file"
             )
         text = files.read_any_text(path, MAX_BYTES).replace("\x1a", "")  # the end of a file, to DOS
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}; choose another file") from error
     # By content: EULUMDAT's second and third line are whole numbers, and LM-63 has a line TILT=.
     is_eulumdat = re.match(r"[^\n]*\n\s*[0-3]\s*\n\s*[0-4]\s*\n", "\n".join(text.splitlines()[:4])) is not None
     return _Eulumdat(path, text).profile() if is_eulumdat else _Lm63(path, text).profile()

@@ -95,13 +95,6 @@ def read_index(name: str | os.PathLike[str], notes: list[str]) -> Dispersion:
     return found
 
 
-def _text(path: Path) -> str:
-    try:
-        return files.read_any_text(path, _MAX_BYTES)
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}; choose another file") from error
-
-
 def _numbers(words: list[str], where: str | Path) -> list[float]:
     try:
         found = [float(word.replace(",", ".")) for word in words]
@@ -123,7 +116,8 @@ def _range_nm(words: list[str], where: str | Path) -> tuple[float, float] | None
 
 def _agf_glasses(path: Path) -> dict[str, dict[str, list[str]]]:
     """Lines NM, CD and LD, split into words, of every glass in an AGF file, by name."""
-    return _parsed_agf(_text(path))
+    with files.reading(path, "choose another file"):
+        return _parsed_agf(files.read_any_text(path, _MAX_BYTES))
 
 
 @lru_cache(maxsize=8)
@@ -191,7 +185,9 @@ def _from_yaml(path: Path) -> tuple[Dispersion, np.ndarray | None]:
     import yaml
 
     try:
-        page = yaml.load(_text(path), yaml.BaseLoader)  # texts, lists and tables only: nothing is constructed
+        with files.reading(path, "choose another file"):
+            text = files.read_any_text(path, _MAX_BYTES)
+        page = yaml.load(text, yaml.BaseLoader)  # texts, lists and tables only: nothing is constructed
     except (yaml.YAMLError, RecursionError) as error:
         raise UserError(f"{path} is not whole YAML; get it again from refractiveindex.info") from error
     entries = page.get("DATA") if isinstance(page, dict) else None
