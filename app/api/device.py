@@ -10,7 +10,6 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor, wait
 from queue import Empty, SimpleQueue
 from threading import Event
-from types import TracebackType
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from ..base.errors import UserError, sentence_of
@@ -24,7 +23,8 @@ Cancel = Callable[[], bool]
 """Called now and then; once it returns true, what was done so far is the result."""
 
 T = TypeVar("T")
-Work = Callable[["Context", Callable[[float, str], None], Callable[[], bool]], T]
+Report = Callable[[float, str], None]
+Work = Callable[["Context", Report, Cancel], T]
 _CALL_EVERY_S = 0.1
 
 
@@ -80,10 +80,14 @@ class Device:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def run(work: Work[T], progress: Progress | None = None, cancel: Cancel | None = None) -> T:
+    """What `work` gives on a device of its own, see `Device.run`."""
+    with Device() as device:
+        return device.run(work, progress, cancel)
 
 
 def _context() -> Context:

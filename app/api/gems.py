@@ -12,7 +12,7 @@ from ..model.gems.figures import ASET_HEAD_DEG, Cancelled, GemFigures, Report
 from ..model.gems.in_scene import stone_in
 from ..model.gems.report import GemReport, TableFire, gem_report
 from ..model.optics.index_file import find_glass
-from .device import Cancel, Device, Progress
+from .device import Cancel, Progress, run
 from .scene import Scene
 
 __all__ = ["GemFigures", "GemReport", "gem"]
@@ -48,8 +48,7 @@ def gem(
     def thrown(report: Report, cancelled: Cancelled) -> TableFire:
         from ..render.gem_fire import table_fire
 
-        with Device() as device:
-            return device.run(lambda context, told, stop: table_fire(context, stone, told, stop), report, cancel)
+        return run(lambda context, told, stop: table_fire(context, stone, told, stop), report, cancel)
 
     found = gem_report(stone, head_deg, progress, cancel, thrown if table else None)
     if found is None:

@@ -19,7 +19,7 @@ from ..base.image_io import save_codes
 from ..commands.solving_table import GRADIENT_SIZE
 from ..model.io.scene_pictures import png_bytes
 from .arguments import Count, Size, settings_of
-from .device import Cancel, Device, Progress
+from .device import Cancel, Progress, Report, run
 from .picture import Floats
 from .rendering import check_receiver
 from .scene import Scene
@@ -83,7 +83,7 @@ def solved(
 ) -> T:
     """What the steps that `begin` returns find. Raises `UserError` where they were stopped."""
 
-    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> T:
+    def work(context: Context, report: Report, stopped: Cancel) -> T:
         def paused(share: float) -> None:
             report(share, "solving")
             if stopped():
@@ -91,8 +91,7 @@ def solved(
 
         return finished(begin(context), paused)
 
-    with Device() as device:
-        return device.run(work, progress, cancel)
+    return run(work, progress, cancel)
 
 
 def gradient(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..base.errors import UserError
 from ..base.generators import finished
 from .arguments import Count, Size, check_scene, settings_of
-from .device import Cancel, Device, Progress
+from .device import Cancel, Progress, Report, run
 from .scene import Scene
 
 if TYPE_CHECKING:
@@ -46,7 +45,7 @@ def page(
     said = words.description if description is None else description
     words = replace(words, title=title or words.title, description=said)
 
-    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Page:
+    def work(context: Context, report: Report, stopped: Cancel) -> Page:
         def told(share: float) -> None:
             if stopped():
                 raise UserError("the page was given up before it was whole")
@@ -55,5 +54,4 @@ def page(
         with closing(page_steps(context, Stage(model, model.camera), settings, receiver, words)) as steps:
             return finished(steps, told)
 
-    with Device() as device:
-        return device.run(work, progress, cancel)
+    return run(work, progress, cancel)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..base.generators import finished
 from .arguments import Count, Size, check_scene, settings_of
-from .device import Cancel, Device, Progress
+from .device import Cancel, Progress, Report, run
 from .picture import CausticMap, Picture, Statistics
 from .scene import Scene
 
@@ -69,7 +69,7 @@ def render(
         settings_of(scene, layer=layer)
     model = scene._model
 
-    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Picture:
+    def work(context: Context, report: Report, stopped: Cancel) -> Picture:
         from ..render.still import render
 
         result = render(model, settings, report, stopped, context, more_layers=more)
@@ -78,8 +78,7 @@ def render(
         stops, antialias = settings.exposure_ev or 0.0, model.render.antialias_highlights
         return Picture(result.rgb, result.spectral, result.bin_edges_nm, stats, named, stops, settings.glare, antialias)
 
-    with Device() as device:
-        return device.run(work, progress, cancel)
+    return run(work, progress, cancel)
 
 
 def caustic(
@@ -105,7 +104,7 @@ def caustic(
     )
     model = scene._model
 
-    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> CausticMap:
+    def work(context: Context, report: Report, stopped: Cancel) -> CausticMap:
         from ..edit.parameters import Stage
         from ..render import bake
 
@@ -121,8 +120,7 @@ def caustic(
         )
 
     check_receiver(scene, receiver)
-    with Device() as device:
-        return device.run(work, progress, cancel)
+    return run(work, progress, cancel)
 
 
 def check_receiver(scene: Scene, receiver: str) -> None:

@@ -6,9 +6,7 @@ This is the viewer's engine without its window: the same store of photons, the s
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
@@ -17,7 +15,7 @@ from ..base.errors import UserError
 from ..base.not_yet import NotYet
 from ..edit.stored_photons import StoredPhotons
 from .arguments import Count, Size, settings_of, whole
-from .device import Cancel, Device, Progress
+from .device import Cancel, Device, Progress, Report
 from .picture import Picture, Statistics
 from .scene import Scene
 from .view import View
@@ -84,7 +82,7 @@ class Session:
 
         started = time.perf_counter()
 
-        def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Picture:
+        def work(context: Context, report: Report, stopped: Cancel) -> Picture:
             rays = self._before.rays
             self._follow(context, report, stopped)
             engine, stats = self._live, self._live.stats
@@ -121,7 +119,7 @@ class Session:
 
         `limit`: about so many, evenly chosen and each standing for more light. Raises `UserError`."""
 
-        def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> StoredPhotons:
+        def work(context: Context, report: Report, stopped: Cancel) -> StoredPhotons:
             self._follow(context, report, stopped)
             found = self._live.stored_photons(_ALL)
             if isinstance(found, NotYet):
@@ -161,9 +159,7 @@ class Session:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # ---- private -----------------------------------------------------------------------------
@@ -179,7 +175,7 @@ class Session:
         assert self._engine is not None
         return self._engine
 
-    def _follow(self, context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
+    def _follow(self, context: Context, report: Report, stopped: Cancel) -> None:
         """Work, in the device's thread, until what is wanted is shown."""
         from ..render.viewer.still_engine import finish
 

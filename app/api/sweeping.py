@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ..commands.table import MAX_WORKERS
 from ..edit.parameters import Stage
 from .arguments import Count, Size, settings_of, whole
-from .device import Cancel, Device, Progress
+from .device import Cancel, Device, Progress, Report
 from .picture import Picture, Statistics
 from .scene import Scene
 
@@ -85,7 +85,7 @@ def _here(plan: SweepPlan, progress: Progress | None, cancel: Cancel | None) -> 
     painters: list[SweepPainter] = []
 
     def draw(number: int) -> Callable[..., Drawn | None]:
-        def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Drawn | None:
+        def work(context: Context, report: Report, stopped: Cancel) -> Drawn | None:
             if not painters:
                 keep_programs(context.ctx)
                 painters.append(SweepPainter(context, plan))
@@ -93,7 +93,7 @@ def _here(plan: SweepPlan, progress: Progress | None, cancel: Cancel | None) -> 
 
         return work
 
-    def release(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> None:
+    def release(context: Context, report: Report, stopped: Cancel) -> None:
         for painter in painters:
             painter.release()
 

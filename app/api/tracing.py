@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from ..edit.stored_photons import StoredPhotons
 from ..model.naming import place_of
 from ..model.optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM
 from .arguments import Count, check_scene, whole
-from .device import Cancel, Device, Progress
+from .device import Cancel, Progress, Report, run
 from .scene import Scene
 from .session import Session
 
@@ -93,7 +93,7 @@ def fan(
     whole(f"rays, at {len(nm)} wavelengths", rays, 1, MAX_RAYS // len(nm))
     whole("reflections", reflections, 0, MAX_REFLECTIONS)
 
-    def work(context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> Fan:
+    def work(context: Context, report: Report, stopped: Cancel) -> Fan:
         from ..model.settings import RenderSettings
         from ..passes.ray_fan import RayFan
         from ..passes.ray_paths import RayPaths
@@ -117,5 +117,4 @@ def fan(
             row[: len(line)] = line
         return Fan(nm, points.reshape(-1, len(nm), *points.shape[1:]))
 
-    with Device() as device:
-        return device.run(work)
+    return run(work)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from ..base.errors import UserError
 from ..edit import camera_controls
 from ..model.scene_camera import camera_values
-from .device import Device
+from .device import Cancel, Device, Report
 from .pages import page
 from .picture import Picture
 from .scene import Scene
@@ -169,7 +169,7 @@ class View:
         self._ending.set()
         self._shown.set()
 
-    def _step(self, context: Context, report: Callable[[float, str], None], stopped: Callable[[], bool]) -> bool:
+    def _step(self, context: Context, report: Report, stopped: Cancel) -> bool:
         """One short stretch of work; whether nothing is left to do."""
         front, now = self._front, time.monotonic()
         if front is None or self._ending.is_set():

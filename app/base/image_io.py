@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import errno
 import io
-import os
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
@@ -162,10 +161,9 @@ def read_image(path: Path | str, layer: str = "") -> Picture:
     kind = _BY_SUFFIX.get(suffix)
     if kind is None or kind.read is None:
         raise UserError(f"cannot read {path}: '{suffix}' cannot be read; use one of {', '.join(READ_SUFFIXES)}")
-    if not os.path.exists(path):
-        raise UserError(f"cannot read {path}: there is no such file; check the name")
-    try:
+    with files.reading(path, "check the name and the file's permissions"):
         files.check_regular(path, files.DATA_BYTES)
+    try:
         return kind.read(path, layer)
     except (OSError, EOFError, ValueError, RuntimeError, KeyError, TypeError, SyntaxError, MemoryError) as error:
         raise UserError(

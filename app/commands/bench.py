@@ -1,4 +1,4 @@
-"""The bench command: check everything first, measure with all kept, write the report, say what was found."""
+"""The commands bench and bench-view: check everything first, measure with all kept, say what was found."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from ..base.memory import check_picture_memory
 from ..base.version import __version__
 from ..bench.results import DEFAULT_METHODS, BenchResult, BenchSettings
 from ..model.settings import CAMERA_METHODS, METHODS
-from .measuring_table import Bench
+from .measuring_table import Bench, BenchView
 from .options import given_for, words
 from .printing import note, show
-from .scenes import load_scenes
+from .scenes import find_scene, load_scenes
 
 if TYPE_CHECKING:
     from ..model.scene import Scene
@@ -29,6 +29,8 @@ CAMERA_SECONDS = 20.0
 picture had as much."""
 CAMERA_SCENES = ("prism_edge", "lens_text", "brilliant_studio", "ball_caustic")
 """Shipped scenes that are about what is seen through glass; `bench --camera` without names measures these."""
+VIEW_SIZE = {True: (960, 540), False: (1920, 1080)}
+"""Pixels of the viewport, by whether the processor draws: the sizes that the viewer promises its frame times for."""
 
 
 def bench(options: Bench, show: Callable[[object], None] = show) -> int:
@@ -158,3 +160,18 @@ def write_and_show(result: BenchResult, directory: Path, show: Callable[[object]
             f"{(directory / 'report.html').resolve()}: the report; {(directory / 'results.json').resolve()}: every "
             "number"
         )
+
+
+def bench_view(options: BenchView) -> int:
+    """Measure the viewer and print; returns the exit code. Raises `UserError`."""
+    from ..bench import viewer_speed
+    from ..bench.machine import words as figure_words
+    from ..gpu.context import create_context
+
+    scene = find_scene(options.scene)
+    with create_context() as context:
+        size = options.size or VIEW_SIZE[context.is_software]
+        print(f"{scene.stem}, viewport {size[0]}×{size[1]}, {context.renderer}, {context.version}")
+        for name, figures in viewer_speed.run(context, scene, size, options.seconds):
+            print(f"{name:<22}{figure_words(figures)}", flush=True)
+    return 0

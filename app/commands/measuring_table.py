@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from ..bench.results import RANDOM_KINDS, REFERENCES
 from ..model.settings import METHODS
@@ -30,17 +31,15 @@ _REFERENCE_SECONDS = Option(
 )
 
 
+def _scenes(help: str) -> Any:
+    return argument("[SCENE]...", help, complete=completion.scenes, repeated=True, default=())
+
+
 @dataclass(frozen=True, kw_only=True)
 class Bench(ReadsScenes):
     """Measure every method's error against its run time, and write a report."""
 
-    scenes: tuple[str, ...] = argument(
-        "[SCENE]...",
-        "Scenes to measure; default: every shipped one that holds glass.",
-        complete=completion.scenes,
-        repeated=True,
-        default=(),
-    )
+    scenes: tuple[str, ...] = _scenes("Scenes to measure; default: every shipped one that holds glass.")
     output: Path | None = target("DIR", "Folder for results.json, tables.md, plots and report.html.", default=None)
     seconds: float | None = setting(
         "S", "Photon time of each method's and seed's largest rendering; default: 3, with --camera 20.", _bench_seconds
@@ -69,13 +68,7 @@ class Bench(ReadsScenes):
 class Stress(ReadsScenes):
     """Measure stiff and extreme cases against their promises; exits with 1 where one is broken."""
 
-    scenes: tuple[str, ...] = argument(
-        "[SCENE]...",
-        "Sweep these scenes; default: all stiff cases, and a sweep over shipped scenes.",
-        complete=completion.scenes,
-        repeated=True,
-        default=(),
-    )
+    scenes: tuple[str, ...] = _scenes("Sweep these scenes; default: all stiff cases, and a sweep over shipped scenes.")
     output: Path | None = target("DIR", "Folder for stress.json and stress.html.", default=None)
     cases: str | None = option("A,B", "Only these cases; 'prism/' is all of that scene's.")
     list_cases: bool = switch("List the cases with their number of severities, and measure nothing.", flags=("--list",))
@@ -85,13 +78,7 @@ class Stress(ReadsScenes):
 class BenchAgreement(ReadsScenes):
     """Compare a method's caustics with the float64 reference by standard scores, by pixels and in 8x8 blocks."""
 
-    scenes: tuple[str, ...] = argument(
-        "[SCENE]...",
-        "Scenes to compare; default: every shipped one that holds glass.",
-        complete=completion.scenes,
-        repeated=True,
-        default=(),
-    )
+    scenes: tuple[str, ...] = _scenes("Scenes to compare; default: every shipped one that holds glass.")
     output: Path = target(
         "DIR", "Folder for agreement.json and scenes drawn by chance.", default=Path("bench_agreement")
     )

@@ -40,7 +40,7 @@ COMMANDS = {
     "bench": ("measuring_table:Bench", "bench:bench"),
     "stress": ("measuring_table:Stress", "stress:stress"),
     "bench-agreement": ("measuring_table:BenchAgreement", "bench_agreement:bench_agreement"),
-    "bench-view": ("measuring_table:BenchView", "bench_view:bench_view"),
+    "bench-view": ("measuring_table:BenchView", "bench:bench_view"),
     "prove-gpu": ("measuring_table:ProveGpu", "prove_gpu:prove_gpu"),
     "farm render": ("table:FarmRender", "farm:render"),
     "farm animate": ("table:FarmAnimate", "farm:animate"),

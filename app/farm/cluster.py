@@ -24,7 +24,6 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from queue import Empty, SimpleQueue
-from types import TracebackType
 from typing import IO, TYPE_CHECKING, Any, Self
 
 from ..base.errors import UserError
@@ -292,9 +291,7 @@ class DaskCrew:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         for attempt, (task, _) in [*self._submitted.items()]:
             self.drop(task, attempt)
         self.client.close(timeout=2)

@@ -190,7 +190,7 @@ def test_a_picture_file_has_its_values_under_the_cursor(state, running, comparis
     assert comparison.pixel((10.5 / SIZE[0], 5.5 / SIZE[1])) == pytest.approx(rgb[5, 10].tolist())
     gone = replace(compared, compare=replace(compared.compare, file=tmp_path / "gone.exr"))
     comparison.advance(gone, running, 0.01)
-    assert comparison.picture is None and "no such file" in comparison.text
+    assert comparison.picture is None and "No such file" in comparison.text
 
 
 def test_a_picture_of_another_size_is_not_shown_and_begun_anew(state, running, comparison, monkeypatch) -> None:

@@ -16,7 +16,7 @@ from spectrasplat.base.image_io import save_codes, write_image
 from spectrasplat.base.movie import open_sink
 from spectrasplat.base.paths import assets_dir
 from spectrasplat.edit import requests
-from spectrasplat.edit.importing import import_objects
+from spectrasplat.edit.opening import import_objects
 from spectrasplat.edit.preferences import load_settings
 from spectrasplat.gpu.context import Context
 from spectrasplat.model.contacts import world_bounds

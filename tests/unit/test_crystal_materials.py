@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.commands.glass_report import describe
+from spectrasplat.commands.glass import describe
 from spectrasplat.edit.glass import set_dispersion, set_dispersion_gain
 from spectrasplat.edit.parameters import paths
 from spectrasplat.model.geometry.primitives import box, plane

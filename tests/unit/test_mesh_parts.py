@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
-from spectrasplat.edit.importing import import_objects
+from spectrasplat.edit.opening import import_objects
 from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.materials.diffuse import Diffuse

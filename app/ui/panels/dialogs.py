@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 
 from ...base.paths import SCENE_SUFFIXES, assets_dir, shipped_scenes
 from ...edit import edits, requests
-from ...edit.importing import import_objects
+from ...edit.opening import import_objects
 from ...edit.state import Selection, State
 from .. import theme
 from ..view_model import JobInfo, ViewModel
