@@ -41,7 +41,8 @@ def bench(options: Bench, show: Callable[[object], None] = show) -> int:
     # What any process of this program spends before it has its scene: interpreter and imports, as processor time, then
     # a scene's file and the OpenGL context.
     start_s, started = time.process_time(), time.perf_counter()
-    scenes = scenes_of(options, settings)
+    named = load_scenes(options.scenes or (CAMERA_SCENES if options.camera_pass else ()))
+    scenes = met_by(settings.reference, named)
     start_s += (time.perf_counter() - started) / len(scenes)
 
     from ..base.progress import ProgressReporter
@@ -107,11 +108,6 @@ def _checked_methods(given: Sequence[str], known: Sequence[str]) -> tuple[str, .
             what = "is a method of the light pass alone" if name in METHODS else "is unknown"
             raise UserError(f"--methods '{name}' {what}{hint or ','} known are {', '.join(known)}")
     return tuple(dict.fromkeys(names))
-
-
-def scenes_of(options: Bench, settings: BenchSettings) -> dict[str, Scene]:
-    """The scenes that are measured, as the reference is to meet them. Raises `UserError`."""
-    return met_by(settings.reference, load_scenes(options.scenes or (CAMERA_SCENES if options.camera_pass else ())))
 
 
 def met_by(reference: str, scenes: dict[str, Scene]) -> dict[str, Scene]:

@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -170,24 +171,16 @@ ANSWERS = ("tir-margin", "eye-mirrors", "eye-absorption", "gap", "stack", "perfe
 """Stress cases against sums and forms in closed form."""
 STRESS = ("overflow", "one-texel", "slivers", "eye-corner", "refusals", "prism/size")
 """What breaks elsewhere first. Every shipped scene is drawn with few photons by the part of the programs."""
-_SHORT_CASES = {"answers": 4, "stress": 4}
+_SHORT_CASES = 4
 
 
-def _answers(short: bool, folder: Path) -> Iterator[Finding]:
-    yield from _cases(ANSWERS[: _SHORT_CASES["answers"]] if short else ANSWERS)
-
-
-def _stress(short: bool, folder: Path) -> Iterator[Finding]:
-    yield from _cases(STRESS[: _SHORT_CASES["stress"]] if short else STRESS)
-
-
-def _cases(names: tuple[str, ...]) -> Iterator[Finding]:
+def _cases(names: tuple[str, ...], short: bool, folder: Path) -> Iterator[Finding]:
     from ..bench.machine import machine
     from ..gpu.context import create_context
     from ..stress.results import StressResult
     from ..stress.runner import all_cases, choose, run
 
-    cases = choose(all_cases(), ",".join(names))
+    cases = choose(all_cases(), ",".join(names[:_SHORT_CASES] if short else names))
     with create_context() as context:
         for at, case in enumerate(cases):
             result = StressResult("", "", "", machine(context), asked=1)
@@ -329,9 +322,9 @@ def _finding(name: str, figures: Mapping[str, float]) -> Finding:
 PARTS = (
     Part("doctor", "Machine, driver, limits", _doctor, (30, 60)),
     Part("programs", "Every program compiles, and is GLSL by the book", _programs, (240, 240)),
-    Part("answers", "Known answers", _answers, (90, 120)),
+    Part("answers", "Known answers", partial(_cases, ANSWERS), (90, 120)),
     Part("pictures", "Pictures against stored ones", _pictures, (240, 240)),
-    Part("stress", "Stress", _stress, (120, 240)),
+    Part("stress", "Stress", partial(_cases, STRESS), (120, 240)),
     Part("frames", "Photons of a frame", _frames, (110, 200), True),
     Part("trace", "Tracing, by events a dispatch and rays in flight", _trace, (80, 90), True),
     Part("camera", "Camera samples, by the longest dispatch allowed", _camera, (50, 90), True),

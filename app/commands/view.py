@@ -93,7 +93,7 @@ def _run(window: Window, scene: Path | None, options: View, interrupted: Interru
     place = _place(window, session.settings.window)
     window.hide()
     if interrupted():
-        # Nobody can be options: what is unsaved stays and is offered at the next start.
+        # Nobody can be asked: what is unsaved stays and is offered at the next start.
         if session.document.unsaved:
             session.autosave.write_now(session.document.scene, session.document.title, session.document.source)
         session.jobs.finish_export()

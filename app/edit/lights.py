@@ -139,7 +139,7 @@ def set_light_kind(scene: Scene, index: int, kind: str) -> Scene:
         if np.linalg.norm(toward) > 1e-9 * around.radius:
             direction = _unit(light, "direction", vec3(toward))
     changed = made(cls, _usual(scene, np.array(direction)) | {"direction": direction} | light.given())
-    return set_light(scene, index, _lighting(scene, changed, _illuminance(scene, light)))
+    return set_light(scene, index, _lighting(scene, changed, light.spectral_power.luminous() / _reach(scene, light)))
 
 
 def set_light_file(scene: Scene, index: int | None, path: Path) -> Scene:
@@ -260,10 +260,6 @@ def _reach(scene: Scene, light: Light) -> float:
     """Luminous quantity of the light over the illuminance it gives the objects' middle, on a plane across it."""
     around = environment_of(scene.objects)
     return light.reach(max(float(np.linalg.norm(around.centre - light.position)), 1e-3 * around.radius))
-
-
-def _illuminance(scene: Scene, light: Light) -> float:
-    return light.spectral_power.luminous() / _reach(scene, light)
 
 
 def _lighting(scene: Scene, light: Light, illuminance: float) -> Light:

@@ -75,7 +75,7 @@ def build_bvh(triangles_xyz: np.ndarray, *, use_cache: bool = True) -> Bvh:
     tree = _load(key, len(triangles))
     if tree is None:
         tree = _build(triangles)
-        _save(key, tree)
+        _KEPT.save(key, tree.depth.to_bytes(4, "little") + tree.order.astype("<i4").tobytes() + tree.nodes.tobytes())
     return tree
 
 
@@ -111,7 +111,3 @@ def _load(key: str, triangle_count: int) -> Bvh | None:
         return None
     depth, order = np.frombuffer(data, "<u4", 1), np.frombuffer(data, "<i4", triangle_count, 4)
     return Bvh(np.frombuffer(data, NODE, offset=4 + order.nbytes), order, int(depth[0]))
-
-
-def _save(key: str, tree: Bvh) -> None:
-    _KEPT.save(key, tree.depth.to_bytes(4, "little") + tree.order.astype("<i4").tobytes() + tree.nodes.tobytes())

@@ -86,10 +86,9 @@ class Mesh:
         """Its flat faces, the largest first; none where it is one, has more than `MAX_FLAT_FACES`, or is shaded as
         curved ones are."""
         planes = [] if self.is_flat or not self.is_faceted else list(islice(_coplanar(self), MAX_FLAT_FACES + 1))
-        return tuple(map(self._face, planes)) if 1 < len(planes) <= MAX_FLAT_FACES else ()
-
-    def _face(self, rows: np.ndarray) -> Mesh:
-        return replace(self.part(np.sort(rows)), corner_normals=None, whole=self)
+        if not 1 < len(planes) <= MAX_FLAT_FACES:
+            return ()
+        return tuple(replace(self.part(np.sort(rows)), corner_normals=None, whole=self) for rows in planes)
 
     def part(self, rows: np.ndarray) -> Mesh:
         """The triangles `rows` (n,) alone, with the vertices that they use."""

@@ -10,7 +10,7 @@ source of the coefficients has them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Literal
 
 import numpy as np
@@ -63,12 +63,12 @@ def _root(n_squared: np.ndarray, slope_of_square: np.ndarray) -> IndexAndSlope:
     return n, slope_of_square / (2.0 * n)
 
 
-def _sellmeier(poles: list[tuple[float, float]], offset: float, um: np.ndarray) -> IndexAndSlope:
-    """n² = 1 + offset + Σ B λ²/(λ² − C), C in µm²."""
+def _sellmeier(kind: Kind, coefficients: Coefficients, um: np.ndarray) -> IndexAndSlope:
+    """n² = 1 + c0 + Σ B λ²/(λ² − C), C in µm²."""
     square = um * um
-    n_squared = np.full_like(um, 1.0 + offset)
+    n_squared = np.full_like(um, 1.0 + coefficients[0])
     slope = np.zeros_like(um)
-    for b, c in poles:
+    for b, c in sellmeier_poles(kind, coefficients):
         distance = square - c
         n_squared += b * square / distance
         slope -= 2.0 * b * c * um / (distance * distance)
@@ -81,14 +81,6 @@ def sellmeier_poles(kind: Kind, coefficients: Coefficients) -> list[tuple[float,
     if kind == "formula 1":
         return [(b, c * c) for b, c in pairs]
     return list(pairs) if kind == "formula 2" else []
-
-
-def _formula_1(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
-    return _sellmeier(sellmeier_poles("formula 1", c), c[0], um)
-
-
-def _formula_2(c: Coefficients, um: np.ndarray) -> IndexAndSlope:
-    return _sellmeier(sellmeier_poles("formula 2", c), c[0], um)
 
 
 def _power_series(terms: Coefficients, um: np.ndarray) -> IndexAndSlope:
@@ -213,8 +205,8 @@ def _end_tangent(h0: float, h1: float, s0: float, s1: float) -> float:
 
 
 _FORMULAS: dict[str, Callable[[Coefficients, np.ndarray], IndexAndSlope]] = {
-    "formula 1": _formula_1,
-    "formula 2": _formula_2,
+    "formula 1": partial(_sellmeier, "formula 1"),
+    "formula 2": partial(_sellmeier, "formula 2"),
     "formula 3": _formula_3,
     "formula 4": _formula_4,
     "formula 5": _formula_5,
