@@ -28,6 +28,7 @@ from ..model.scene import (
     SceneObject,
     Vec3,
 )
+from ..model.scene_camera import camera_numbers
 from ..model.vectors import vec3
 
 if TYPE_CHECKING:
@@ -66,16 +67,6 @@ _ORBIT = {
         "Camera's height above the target as an angle, added to what it is", "°", -180.0, 180.0, 1
     ),
     "distance": Parameter("Distance from the camera to its target", "units", 1e-6, _FAR, 1),
-    "fov_deg": Parameter("Vertical field of view", "°", 0.01, 179.0),
-    "extent": Parameter("Height of the picture of an orthographic camera", "units", 1e-9, _FAR),
-    "lens_radius": Parameter("Half the aperture of the camera's lens; 0: all is in focus", "units", 0.0, 1e6),
-    "focus_distance": Parameter("Distance from the lens to the plane of focus", "units", 1e-6, 1e9),
-}
-_CAMERA_FIELDS = {
-    "fov_deg": "vertical_fov_deg",
-    "extent": "vertical_extent",
-    "lens_radius": "lens_radius",
-    "focus_distance": "focus_distance",
 }
 _PLACE = {f"position.{axis}": Parameter(f"Position along {axis}", "units", -_FAR, _FAR) for axis in _AXES}
 _TARGET = {f"target.{axis}": Parameter(f"Point looked at, along {axis}", "units", -_FAR, _FAR) for axis in _AXES}
@@ -100,9 +91,8 @@ _POWER = Parameter("Power, as a multiple of what it is", "×", 0.0, 1e6)
 def paths(scene: Scene, camera: Camera) -> dict[str, Parameter]:
     """All parameters that `scene` seen by `camera` has."""
     found = dict(_GLOBAL)
-    skipped = "extent" if camera.kind == "pinhole" else "fov_deg"
-    own = {**_PLACE, **_TARGET, **_ORBIT}
-    found |= {f"camera.{name}": parameter for name, parameter in own.items() if name != skipped}
+    own = {**_PLACE, **_TARGET, **_ORBIT} | _of_numbers(camera)
+    found |= {f"camera.{name}": parameter for name, parameter in own.items()}
     for item in scene.objects:
         parts = {**_PLACE, **_TURN} | _of_glass(item.material) | _of_numbers(item.material)
         found |= {f"objects.{item.name}.{name}": parameter for name, parameter in parts.items()}
@@ -202,15 +192,17 @@ def _camera_value(camera: Camera, name: str) -> float:
         return math.dist(camera.position, camera.target)
     if name == "focus_distance":
         return camera.plane_of_focus
-    return getattr(camera, _CAMERA_FIELDS[name]) if name in _CAMERA_FIELDS else 0.0
+    numbers = _animated_numbers(camera)
+    return getattr(camera, numbers[name].attribute) if name in numbers else 0.0
 
 
 def _with_camera(camera: Camera, name: str, value: float) -> Camera:
     field, _, axis = name.partition(".")
     if axis:
         return _changed(camera, field, _with_axis(getattr(camera, field), axis, value))
-    if name in _CAMERA_FIELDS:
-        return _changed(camera, _CAMERA_FIELDS[name], value)
+    numbers = _animated_numbers(camera)
+    if name in numbers:
+        return _changed(camera, numbers[name].attribute, value)
     target, arm = np.asarray(camera.target), np.subtract(camera.position, camera.target)
     up = np.asarray(camera.up, float) / np.linalg.norm(camera.up)
     if name == "distance":
@@ -279,7 +271,7 @@ def _with_glass(dispersion: Dispersion, name: str, value: float) -> Dispersion:
     return glass.with_gain(glass.from_abbe(n_d, v_d, dispersion.name), dispersion.gain)
 
 
-def _of_numbers(thing: Light | Material) -> dict[str, Parameter]:
+def _of_numbers(thing: Camera | Light | Material) -> dict[str, Parameter]:
     found = {}
     for name, number in _animated_numbers(thing).items():
         animated = number.animated
@@ -288,9 +280,10 @@ def _of_numbers(thing: Light | Material) -> dict[str, Parameter]:
     return found
 
 
-def _animated_numbers(thing: Light | Material) -> dict[str, Number]:
-    """The numbers of a light's shape, or of a material, by their names in an animation."""
-    return {n.animated.name or n.attribute: n for n in thing.shown_numbers() if n.animated is not None}
+def _animated_numbers(thing: Camera | Light | Material) -> dict[str, Number]:
+    """The numbers of a camera, of a light's shape, or of a material, by their names in an animation."""
+    numbers = camera_numbers(thing) if isinstance(thing, Camera) else thing.shown_numbers()
+    return {n.animated.name or n.attribute: n for n in numbers if n.animated is not None}
 
 
 def _light_value(light: Light, name: str) -> float:

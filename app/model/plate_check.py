@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.errors import UserError
+from ..base.tone_map import luminance
 from .geometry.mesh import Mesh
 from .optics.caustic_plate import Plate, landing, plate_of
 from .optics.glass import LINE_C_NM, LINE_D_NM, LINE_F_NM, Dispersion
 
 PIXELS = 96
 """Pixels of the longer side at which pictures are compared."""
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _ALIGNED = 40_000
 """Samples by which pictures are brought into line."""
 _BLUR_PX = 0.7
@@ -186,12 +186,12 @@ def _target(rgb: np.ndarray) -> np.ndarray:
     """Its luminance at `PIXELS`, of mean 1. Raises `UserError` for a blank one."""
     from PIL import Image
 
-    luminance = np.maximum(np.asarray(rgb, np.float64) @ _LUMINANCE, 0.0)
-    h, w = luminance.shape
+    grey = np.maximum(luminance(np.asarray(rgb, np.float64)), 0.0)
+    h, w = grey.shape
     scale = PIXELS / max(h, w)
     size = (max(1, round(w * scale)), max(1, round(h * scale)))
     method = Image.Resampling.BOX if scale < 1.0 else Image.Resampling.BILINEAR
-    small = np.asarray(Image.fromarray(luminance.astype(np.float32)).resize(size, method), np.float64)
+    small = np.asarray(Image.fromarray(grey.astype(np.float32)).resize(size, method), np.float64)
     mean = float(small.mean())
     if min(small.shape) < 4 or mean <= 0.0 or small.std() < _BLANK * mean:
         raise UserError(

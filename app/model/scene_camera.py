@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .fields import Number, Vector, read_fields, write_fields
+from .fields import Animated, Number, Vector, read_fields, write_fields
 from .io.scene_table import SceneTable
 from .placement import Surroundings
 from .scene import Camera
@@ -50,13 +50,22 @@ def camera_rays(camera: Camera, picture: tuple[int, int], grid: int) -> tuple[np
 
 
 _PLACE = (Vector("position"), Vector("target", None), Vector("up", (0.0, 0.0, 1.0), nonzero=True))
+_FIELD = Animated("Vertical field of view", 0.01, 179.0, "fov_deg")
+_EXTENT = Animated("Height of the picture of an orthographic camera", 1e-9, 1e9, "extent")
+_APERTURE = Animated("Half the aperture of the camera's lens; 0: all is in focus")
+_FOCUS = Animated("Distance from the lens to the plane of focus", 1e-6)
 _VIEW = {
-    "pinhole": Number("vertical_fov_deg", 35.0, above=0.0, below=180.0),
-    "orthographic": Number("vertical_extent", None, above=0.0),
+    "pinhole": Number("vertical_fov_deg", 35.0, above=0.0, below=180.0, unit="°", animated=_FIELD),
+    "orthographic": Number("vertical_extent", None, above=0.0, unit="units", animated=_EXTENT),
 }
-LENS_RADIUS = Number("lens_radius", 0.0, at_least=0.0, at_most=1e6, optional=True)
-FOCUS_DISTANCE = Number("focus_distance", None, above=0.0, at_most=1e9)
+LENS_RADIUS = Number("lens_radius", 0.0, at_least=0.0, at_most=1e6, optional=True, unit="units", animated=_APERTURE)
+FOCUS_DISTANCE = Number("focus_distance", None, above=0.0, at_most=1e9, unit="units", animated=_FOCUS)
 LENS = (LENS_RADIUS, FOCUS_DISTANCE)
+
+
+def camera_numbers(camera: Camera) -> tuple[Number, ...]:
+    """What it sees of the scene, and its lens."""
+    return _VIEW[camera.kind], *LENS
 
 
 def read_camera(table: SceneTable, around: Surroundings) -> Camera:
@@ -80,4 +89,4 @@ def read_camera(table: SceneTable, around: Surroundings) -> Camera:
 
 def camera_values(camera: Camera) -> dict[str, Any]:
     """The [camera] table of a scene file."""
-    return {"kind": camera.kind} | write_fields((*_PLACE, _VIEW[camera.kind], *LENS), camera)
+    return {"kind": camera.kind} | write_fields((*_PLACE, *camera_numbers(camera)), camera)

@@ -16,10 +16,9 @@ import numpy as np
 from ...base import files
 from ...base.errors import UserError
 from ...base.image_io import MAX_PIXELS
-from ...base.tone_map import srgb_eotf
+from ...base.tone_map import luminance, srgb_eotf
 
 PICTURE_SUFFIXES = (".hdr", ".pic", ".exr", ".npy", ".png", ".jpg", ".jpeg")
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 _NOISE = 1e-3
 """Negatives this far below 0, as a share of the brightest value, come from compression and become 0."""
 
@@ -114,7 +113,7 @@ def _checked(rgb: np.ndarray, where: str, is_converted: bool) -> tuple[np.ndarra
             f"{where}: {undefined} values are not a number and {infinite} infinite; export it with finite values"
         )
     # Of colours outside of Rec.709 one channel is negative and their luminance is not.
-    negative = rgb @ _LUMINANCE < 0.0 if is_converted else rgb < 0.0
+    negative = luminance(rgb) < 0.0 if is_converted else rgb < 0.0
     if not negative.any():
         return rgb, ()
     count, lowest, highest = int(negative.sum()), float(rgb[negative].min()), float(rgb.max())
