@@ -3,15 +3,13 @@ programs in which scenes are modelled and played."""
 
 from __future__ import annotations
 
-import sys
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
-from ..base.interrupts import Interruption, interrupt_flag
-from .opened import note_assumptions, open_scene, settings_for
+from .opened import note_assumptions, open_scene, settings_for, worked_out
 from .printing import note
 from .scenes import find_scene
 from .table import Bake, Export
@@ -19,8 +17,6 @@ from .table import Bake, Export
 if TYPE_CHECKING:
     from ..model.scene import Scene
     from ..render.bake import Drawn
-
-T = TypeVar("T")
 
 
 def bake_texture(options: Bake) -> int:
@@ -76,9 +72,7 @@ def _design(options: Export) -> int:
 
 def _page(options: Export) -> int:
     """Make a page; returns the exit code. Raises `UserError` as `_baked`."""
-    from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
-    from ..gpu.context import create_context
     from ..render.page.page import check_page, check_page_path, page_size, page_steps, words_of
 
     check_page_path(options.output)
@@ -88,37 +82,15 @@ def _page(options: Export) -> int:
     width, height = page_size(scene)
     settings = settings_for(options, scene, width=width, height=height, exposure_ev=scene.render.exposure_ev)
     started = time.perf_counter()
-    words = words_of(scene, find_scene(options.scene))
-    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
-        steps = page_steps(context, Stage(scene, scene.camera), settings, options.receiver, words)
-        page = finished(steps, progress, "making the page", interrupted)
-        if page is None:
-            return interrupted.exit_code
-        page.to_html(options.output)
+    stage, words = Stage(scene, scene.camera), words_of(scene, find_scene(options.scene))
+    page = worked_out(
+        scene, "making the page", lambda context: page_steps(context, stage, settings, options.receiver, words)
+    )
+    page.to_html(options.output)
     megabytes = options.output.stat().st_size / 1e6
     took = time.perf_counter() - started
     print(f"{options.output.resolve()}: a page of {megabytes:.1f} MB in {took:.1f} s; any browser opens it")
     return 0
-
-
-def finished(
-    steps: Generator[float, None, T],
-    progress: Callable[[float, str], None],
-    what: str,
-    interrupted: Interruption,
-    stopped: str = "nothing was written: it is whole or not at all",
-) -> T | None:
-    """What `steps` return; None, said to the user as `stopped`, where the work was interrupted."""
-    while True:
-        try:
-            progress(next(steps), what)
-        except StopIteration as end:
-            value: T = end.value
-            return value
-        if interrupted():
-            steps.close()
-            print(f"spectrasplat: {stopped}", file=sys.stderr)
-            return None
 
 
 def _baked(
@@ -127,9 +99,7 @@ def _baked(
     """Bake, write and say so; returns the exit code. Raises `UserError` for all that can be refused beforehand:
     numbers, memory, files that cannot be written, the scene, its receiver."""
     from ..base.atomic import check_writable
-    from ..base.progress import ProgressReporter
     from ..edit.parameters import Stage
-    from ..gpu.context import create_context
     from ..render import bake
 
     for path in outputs:
@@ -140,11 +110,8 @@ def _baked(
     width, height = bake.DEFAULT_SIZE
     settings = settings_for(options, scene, width=width, height=height)
     started = time.perf_counter()
-    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
-        steps = bake.bake_map(context, Stage(scene, scene.camera), settings, options.receiver)
-        baked = finished(steps, progress, "baking", interrupted)
-        if baked is None:
-            return interrupted.exit_code
+    stage = Stage(scene, scene.camera)
+    baked = worked_out(scene, "baking", lambda context: bake.bake_map(context, stage, settings, options.receiver))
     for notice in baked.notices:
         note(notice)
     write(scene, baked)

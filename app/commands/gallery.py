@@ -15,7 +15,7 @@ from ..base.errors import UserError, suggestion
 from ..base.interrupts import Interruption, interrupt_flag
 from ..base.paths import assets_dir, shipped_scenes
 from ..base.version import __version__
-from .bake import finished
+from .opened import finished
 from .printing import note
 from .table import Gallery
 
@@ -66,8 +66,6 @@ def gallery(options: Gallery) -> int:
                 progress((done + share) / len(todo), name)
 
             found = _make(context, entry, options, folder, report, interrupted)
-            if found is None:
-                return interrupted.exit_code
             made[entry.page] = found | {"key": _key(entry, options)}
             with atomic_output(folder / _MADE) as temporary:
                 temporary.write_text(json.dumps(made, indent=1, ensure_ascii=False), encoding="utf-8")
@@ -114,8 +112,8 @@ def _make(
     folder: Path,
     report: Callable[[float, str], None],
     interrupted: Interruption,
-) -> dict[str, Any] | None:
-    """A page and its picture; what the list says of them, None where it was interrupted."""
+) -> dict[str, Any]:
+    """A page and its picture; what the list says of them."""
     from ..edit.parameters import Stage
     from ..model.io.scene_file import load_scene
     from ..model.settings import RenderSettings
@@ -137,8 +135,6 @@ def _make(
     except UserError as error:
         note(f"{entry.name}: {error}")
         return card | {"words": str(error)}
-    if page is None:
-        return None
     picture = Path(entry.page).with_suffix(".jpg").as_posix()
     page.to_html(folder / entry.page)
     (folder / picture).write_bytes(np.asarray(page.arrays["still"]).tobytes())

@@ -1,12 +1,18 @@
-"""What a command's options make of its scene: the scene as it is opened, and the settings of its rendering."""
+"""A command's scene: opened as the options say, with settings, and worked on until there is something to write."""
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable, Generator
+from contextlib import closing
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from ..base import files
+from click.exceptions import Exit
+
+from ..base import files, generators
 from ..base.errors import UserError
+from ..base.interrupts import Interruption, interrupt_flag
 from ..base.memory import check_picture_memory
 from ..model.settings import RenderSettings
 from .options import given_for
@@ -15,7 +21,10 @@ from .scenes import check_layer, find_scene
 from .table import OpensScene
 
 if TYPE_CHECKING:
+    from ..gpu.context import Context
     from ..model.scene import Scene
+
+T = TypeVar("T")
 
 
 def open_scene(values: OpensScene) -> Scene:
@@ -56,3 +65,36 @@ def settings_for(values: object, scene: Scene, **defaults: object) -> RenderSett
     check_layer(settings.layer, scene)
     check_picture_memory(settings.width, settings.height, settings.bins)
     return settings
+
+
+def worked_out(
+    scene: Scene,
+    what: str,
+    begin: Callable[[Context], Generator[float, None, T]],
+    stopped: str = "nothing was written: it is whole or not at all",
+) -> T:
+    """What the steps of `begin` return on a context of their own; see `finished`."""
+    from ..base.progress import ProgressReporter
+    from ..gpu.context import create_context
+
+    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
+        return finished(begin(context), progress, what, interrupted, stopped)
+
+
+def finished(
+    steps: Generator[float, None, T],
+    progress: Callable[[float, str], None],
+    what: str,
+    interrupted: Interruption,
+    stopped: str,
+) -> T:
+    """What `steps` return. Where the work is interrupted, the user is told `stopped` and the command ends."""
+
+    def at_pause(share: float) -> None:
+        progress(share, what)
+        if interrupted():
+            print(f"spectrasplat: {stopped}", file=sys.stderr)
+            raise Exit(interrupted.exit_code)
+
+    with closing(steps):
+        return generators.finished(steps, at_pause)

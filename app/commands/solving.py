@@ -8,19 +8,15 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from ..base.errors import UserError
-from ..base.interrupts import INTERRUPTED, interrupt_flag
-from .bake import finished
-from .opened import note_assumptions, open_scene, settings_for
+from .opened import note_assumptions, open_scene, settings_for, worked_out
 from .printing import note, show
 from .solving_table import GRADIENT_SIZE, Fit, Gradient, Match
 
 if TYPE_CHECKING:
     from ..edit import solved
-    from ..gpu.context import Context
     from ..model.scene import Scene
     from ..render.solving import Solver
 
-T = TypeVar("T")
 Found = TypeVar("Found", bound="solved.Fit | solved.Match")
 _NO_ANSWER = "stopped before there was an answer"
 
@@ -50,9 +46,12 @@ def gradient(options: Gradient) -> int:
         settings = replace(settings, layer=f"map:{options.receiver}")
     steps = None if options.step is None else {options.of: options.step}
     started = time.perf_counter()
-    found = _run(scene, "deriving", lambda context: derived(context, stage, settings, [options.of], steps, noise=True))
-    if found is None:
-        return INTERRUPTED
+    found = worked_out(
+        scene,
+        "deriving",
+        lambda context: derived(context, stage, settings, [options.of], steps, noise=True),
+        _NO_ANSWER,
+    )
     its = found.derivatives[0]
     if is_shown:
         save_codes(options.output, signed_codes(its.picture.rgb))
@@ -99,18 +98,9 @@ def _solved(
     note_assumptions(scene)
     wish = settings_for(options, scene), options.receiver, values, between or None, options.width
     started = time.perf_counter()
-    found = _run(scene, what, lambda context: solution(context, Stage(scene, scene.camera), *wish, work))
-    if found is None:
-        return INTERRUPTED
+    stage = Stage(scene, scene.camera)
+    found = worked_out(scene, what, lambda context: solution(context, stage, *wish, work), _NO_ANSWER)
     for label, text in found.rows():
         show(f"{label:<28} {text}")
     show(f"in {time.perf_counter() - started:.1f} s")
     return 0
-
-
-def _run(scene: Scene, what: str, steps: Callable[[Context], Generator[float, None, T]]) -> T | None:
-    from ..base.progress import ProgressReporter
-    from ..gpu.context import create_context
-
-    with create_context() as context, interrupt_flag() as interrupted, ProgressReporter(scene.name) as progress:
-        return finished(steps(context), progress, what, interrupted, _NO_ANSWER)

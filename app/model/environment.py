@@ -199,6 +199,12 @@ def _baked_directions() -> np.ndarray:
     return direction_of(Environment(np.zeros((1, 1, 3), np.float32)), u, v)
 
 
+def texel_solid_angles(height: int, width: int) -> np.ndarray:
+    """Those of a panorama's texels, row by row: float64 (H, 1), sr."""
+    edges = np.cos(np.pi * np.arange(height + 1) / height)
+    return ((edges[:-1] - edges[1:]) * 2.0 * np.pi / width)[:, None]
+
+
 def averaged_down(rgb: np.ndarray, height: int, width: int) -> np.ndarray:
     """A picture of at most this size, float32 (h, w, 3): area-weighted means of one that is larger."""
     return _averaged_rows(_averaged_rows(rgb, height).swapaxes(0, 1), width).swapaxes(0, 1)

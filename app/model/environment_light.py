@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..base.random_words import random_word
-from .environment import averaged_down, direction_of
+from .environment import averaged_down, direction_of, texel_solid_angles
 from .optics.colorimetry import K_M, VISIBLE_NM, cmf_xyz, daylight_per_lumen, rgb_basis, xyz_to_rgb709
 from .optics.spectral_tables import SpectralAxis
 from .scene import Scene
@@ -81,10 +81,7 @@ class EnvironmentLight:
 
     @cached_property
     def _solid_angles(self) -> np.ndarray:
-        """float64 (H, 1): of a texel, sr."""
-        height, width = self.rgb.shape[:2]
-        edges = np.cos(np.pi * np.arange(height + 1) / height)
-        return ((edges[:-1] - edges[1:]) * 2.0 * np.pi / width)[:, None]
+        return texel_solid_angles(*self.rgb.shape[:2])
 
     @cached_property
     def _tables(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from .contacts import world_bounds
-from .environment import direction_of
+from .environment import direction_of, texel_solid_angles
 from .lights.directional import SUN_DIAMETER_DEG, DirectionalLight
 from .lights.light import Light
 from .lights.outlined import AreaLight
@@ -137,8 +137,7 @@ def _with_panorama_lights(scene: Scene) -> Scene:
 def lights_of(environment: Environment) -> tuple[tuple[DirectionalLight | PanoramaWindow, ...], Environment]:
     """The lights of a panorama, brightest first, and what it is without them; their sum is the panorama."""
     rgb = np.asarray(environment.rgb, float)
-    edges = np.cos(np.pi * np.arange(rgb.shape[0] + 1) / rgb.shape[0])
-    solid = np.broadcast_to(((edges[:-1] - edges[1:]) * 2.0 * np.pi / rgb.shape[1])[:, None], rgb.shape[:2])
+    solid = np.broadcast_to(texel_solid_angles(*rgb.shape[:2]), rgb.shape[:2])
     total, found = float((rgb.mean(axis=2) * solid).sum()), list[DirectionalLight | PanoramaWindow]()
     for spot, ring in _regions(rgb.mean(axis=2)):
         around = np.median(rgb[ring], axis=0)
