@@ -103,7 +103,7 @@ def set_diffuse_colour(scene: Scene, index: int, rgb: Vec3) -> Scene:
         case Diffuse():
             material: Material = item.material.changed(reflectance_rgb=colour, reflectance=None)
         case Mirror():
-            material = Mirror(colour)
+            material = item.material.changed(reflectance_rgb=colour)
         case _:
             raise UserError(f"'{item.name}' is neither diffuse nor a mirror and has no colour")
     return changed(scene, index, material=material)

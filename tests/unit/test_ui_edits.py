@@ -167,7 +167,9 @@ def test_added_shapes_are_saved_by_name(scene: Scene, tmp_path: Path) -> None:
 
 def test_colours(scene: Scene) -> None:
     assert set_diffuse_colour(scene, FLOOR, (0.1, 0.2, 0.3)).objects[FLOOR].material == Diffuse((0.1, 0.2, 0.3))
-    assert set_diffuse_colour(scene, MIRROR, (0.1, 0.2, 0.3)).objects[MIRROR].material == Mirror((0.1, 0.2, 0.3))
+    rough = set_material(scene, MIRROR, Mirror(metal="gold", roughness=0.3))
+    coloured = set_diffuse_colour(rough, MIRROR, (0.1, 0.2, 0.3)).objects[MIRROR].material
+    assert coloured == Mirror((0.1, 0.2, 0.3), metal="gold", roughness=0.3)
     assert "between 0 and 1" in refusal(set_diffuse_colour, scene, FLOOR, (0.1, 1.2, 0.3))
     assert "no colour" in refusal(set_diffuse_colour, scene, BLOCK, (0.1, 0.2, 0.3))
 

@@ -23,7 +23,7 @@ from ..lights import LIGHT_KINDS, DirectionalLight, PointLight, SpotLight
 from ..lights.light import made
 from ..lights.light_file import read_light
 from ..naming import Names, Unshown
-from ..placement import Surroundings
+from ..placement import Surroundings, rotation_about
 from ..scene import Camera, Light, Material, Scene, SceneObject
 from ..scene_camera import LENS
 from ..scene_defaults import (
@@ -353,12 +353,11 @@ class _Reader:
     def _camera(self, node: dict[str, Any], world: np.ndarray) -> Camera:
         entry = self.document.item("cameras", node["camera"])
         self._check_turn(world, f"camera '{node.get('name', entry.get('name', 'camera'))}'")
-        distance = float(own_extras(node).get("target_distance", _DEFAULT_DISTANCE))
+        own = own_extras(node)
+        distance = float(own.get("target_distance", _DEFAULT_DISTANCE))
         position, forward, up = world[:3, 3], -unit(world[:3, 2]), unit(world[:3, 1])
-        own = {
-            field.attribute: own_extras(node)[field.attribute] for field in LENS if field.attribute in own_extras(node)
-        }
-        lens = read_fields(LENS, SceneTable(own, self.document.path, f"camera.extras.{EXTRAS}"))
+        given = {field.attribute: own[field.attribute] for field in LENS if field.attribute in own}
+        lens = read_fields(LENS, SceneTable(given, self.document.path, f"camera.extras.{EXTRAS}"))
         camera = Camera(vec3(position), vec3(position + distance * forward), vec3(up), **lens)
         if entry.get("type") == "orthographic":
             extent = 2.0 * float(entry["orthographic"]["ymag"])
@@ -455,15 +454,8 @@ def _triangles(order: np.ndarray, mode: int, where: str) -> np.ndarray:
 
 def _rotation(quaternion: Any) -> np.ndarray:
     """Rotation matrix (3, 3) of a quaternion x, y, z, w."""
-    q = np.array(quaternion, dtype=np.float64)
-    length = math.hypot(*q)
-    if not 0.0 < length < math.inf:
+    *vector, real = np.array(quaternion, dtype=np.float64)
+    sine = math.hypot(*vector)
+    if not 0.0 < math.hypot(sine, real) < math.inf:
         raise ValueError("a rotation quaternion is zero or not finite")
-    x, y, z, w = q / length
-    return np.array(
-        [
-            (1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)),
-            (2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)),
-            (2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)),
-        ]
-    )
+    return rotation_about(vec3(np.array(vector) / max(sine, 1e-300)), 2.0 * math.atan2(sine, real))

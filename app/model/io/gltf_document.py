@@ -239,9 +239,8 @@ def open_document(path: str | os.PathLike[str]) -> GltfDocument:
         )
     else:
         document = GltfDocument(path, _parsed(path, data))
-    version = (
-        str(document.json.get("asset", {}).get("version", "")) if isinstance(document.json.get("asset"), dict) else ""
-    )
+    asset = document.json.get("asset")
+    version = str(asset.get("version", "")) if isinstance(asset, dict) else ""
     if not version.startswith("2."):
         raise document.fail(f"glTF version '{version}' is not supported; export it as glTF 2.0")
     return document
@@ -404,7 +403,6 @@ def _glb(text: bytes, binary: bytes, others: list[tuple[int, bytes]]) -> bytes:
 DRACO = "KHR_draco_mesh_compression"
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 COMPRESSION = frozenset({DRACO, *MESHOPT})
-_MOST_ELEMENTS = 100_000_000
 
 
 def decoder(package: str, method: str, where: str) -> ModuleType:
@@ -428,7 +426,7 @@ def meshopt_bytes(how: dict[str, Any], data: bytes, where: str) -> bytes:
     """The elements, `count` of `byteStride` bytes, that `data` hold. Raises UserError for damaged ones."""
     package = decoder("meshoptimizer", "meshoptimizer", where)
     count, stride = int(how["count"]), int(how["byteStride"])
-    if not 0 < count * stride <= _MOST_ELEMENTS:
+    if not 0 < count * stride <= MAX_ELEMENTS:
         raise UserError(f"{where} promises {count} elements of {stride} bytes; export the file again")
     try:
         decode = {

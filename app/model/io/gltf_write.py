@@ -259,19 +259,14 @@ class _Writer:
 
     def _camera(self, camera: Camera) -> None:
         offset = np.subtract(camera.target, camera.position)
-        aspect = {"aspectRatio": 16.0 / 9.0}
-        lens: dict[str, Any]
+        distance, aspect = float(np.linalg.norm(offset)), 16.0 / 9.0
         if camera.kind == "orthographic":
             half = 0.5 * camera.vertical_extent
-            lens = {"type": "orthographic", "orthographic": {"xmag": half * 16.0 / 9.0, "ymag": half}}
-            lens["orthographic"] |= {"znear": 0.0, "zfar": 100.0 * float(np.linalg.norm(offset))}
+            kind, seen = "orthographic", {"xmag": half * aspect, "ymag": half, "znear": 0.0, "zfar": 100.0 * distance}
         else:
-            near = 1e-3 * float(np.linalg.norm(offset))
-            lens = {
-                "type": "perspective",
-                "perspective": {"yfov": math.radians(camera.vertical_fov_deg), "znear": near},
-            }
-            lens["perspective"] |= aspect
+            yfov = math.radians(camera.vertical_fov_deg)
+            kind, seen = "perspective", {"yfov": yfov, "znear": 1e-3 * distance, "aspectRatio": aspect}
+        lens: dict[str, Any] = {"type": kind, kind: seen}
         world = _look_world(camera.position, offset, camera.up)
         node = self.origins.camera
         entry: dict[str, Any] = {"name": "camera"}
@@ -280,7 +275,7 @@ class _Writer:
             lens = {**self.json["cameras"][old["camera"]], **lens}
             del old["camera"]
         entry["camera"] = self._new.append("cameras", lens)
-        entry["extras"] = {EXTRAS: {"target_distance": float(np.linalg.norm(offset))} | write_fields(LENS, camera)}
+        entry["extras"] = {EXTRAS: {"target_distance": distance} | write_fields(LENS, camera)}
         # First in the scene, so that it is the camera a reader finds.
         self._add_node(entry, world, first=True)
 

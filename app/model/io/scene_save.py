@@ -160,6 +160,11 @@ def _kept_objects(
         first += len(of_entry)
     written: list[dict[str, Any]] = []
     changed: list[SceneObject] = []
+
+    def write_changed() -> None:
+        written.extend(_objects(group, materials, path) for group in _groups(tuple(changed)))
+        changed.clear()
+
     at = 0
     while at < len(scene.objects):
         entry, old = entries.get(scene.objects[at].name, ({}, ()))
@@ -168,19 +173,18 @@ def _kept_objects(
             entry, old = entries.get(before.objects[at].name, ({}, ()))
         new = scene.objects[at : at + len(old)]
         if old and len(new) == len(old) and all(map(_same_object, new, old)):
-            written += [_objects(group, materials, path) for group in _groups(tuple(changed))]
+            write_changed()
             written.append(entry)
-            changed = []
             at += len(old)
         elif len(old) == 1 and "instances" not in entry:
-            written += [_objects(group, materials, path) for group in _groups(tuple(changed))]
+            write_changed()
             written.append(_kept_object(entry, old[0], scene.objects[at], materials, path))
-            changed = []
             at += 1
         else:
             changed.append(scene.objects[at])
             at += 1
-    return written + [_objects(group, materials, path) for group in _groups(tuple(changed))]
+    write_changed()
+    return written
 
 
 def _kept_object(
