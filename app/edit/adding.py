@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..base.errors import UserError, suggestion
-from ..model.contacts import world_bounds
 from ..model.materials.dielectric import DEFAULT_GLASS
 from ..model.naming import free_name
 from ..model.optics import catalogue
@@ -61,7 +60,7 @@ def beside(scene: Scene, items: Sequence[SceneObject]) -> list[SceneObject]:
     """`items` moved sideways together to the first place where they overlap no other object and hold no light."""
     low, high = bounds_of(items)
     sideways, forward, _ = up_frame(scene).T
-    solid = [world_bounds(o) for o in scene.objects if not o.material.receives]
+    solid = [o.world_bounds for o in scene.objects if not o.material.receives]
     lights = [np.array(light.position) for light in scene.lights if light.has_place]
     step = 1.1 * np.abs(high - low)
     for ring in range(64):

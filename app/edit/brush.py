@@ -64,8 +64,7 @@ def resized(brush: Brush, steps: float, visible_height: float) -> Brush:
 
 def followed(brush: Brush, before: View, after: View) -> Brush:
     """As large in the picture as it was before the view changed."""
-    heights = (view.height_at(view.target_distance) for view in (before, after))
-    was, now = heights
+    was, now = (view.height_at(view.target_distance) for view in (before, after))
     return brush if was == now else replace(brush, radius=brush.radius * now / was)
 
 
@@ -87,7 +86,6 @@ def extend(stroke: Stroke, scene: Scene, position: Vec3, dt: float) -> Stroke:
 
 def applied(scene: Scene, stroke: Stroke) -> Scene:
     """The scene with the stroke on its receiver."""
-
     return with_dabs(scene, stroke.object_index, stroke.before + stroke.dabs)
 
 

@@ -17,7 +17,7 @@ from ..model.lights.light import DEFAULT_ILLUMINANCE, PowerKey, made
 from ..model.naming import checked_name, free_name
 from ..model.optics import spectrum as spectra
 from ..model.optics.spectrum import Spectrum
-from ..model.placement import default_direction
+from ..model.placement import default_direction, rotation_about
 from ..model.scene import Light, Scene, Vec3
 from ..model.scene_checks import check_lines, check_outside
 from ..model.scene_defaults import environment_of
@@ -106,9 +106,8 @@ def duplicate_light(scene: Scene, index: int) -> Scene:
     frame = up_frame(scene)
     copy = replace(light, name=free_name(light.name, [other.name for other in scene.lights]))
     if not light.has_place:
-        turn = math.radians(15.0)
-        about_up = np.array([(math.cos(turn), -math.sin(turn), 0), (math.sin(turn), math.cos(turn), 0), (0, 0, 1)])
-        copy = copy.changed(direction=vec3(frame @ about_up @ frame.T @ light.direction))
+        turn = rotation_about(vec3(frame[:, 2]), math.radians(15.0))
+        copy = copy.changed(direction=vec3(turn @ light.direction))
     else:
         copy = copy.changed(position=vec3(light.position + 0.5 * environment_of(scene.objects).radius * frame[:, 0]))
     return set_light(scene, len(scene.lights), copy)

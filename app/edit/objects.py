@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.local_dispersion import MAX_DAB_LOG2
+from ..model.local_dispersion import check_dab
 from ..model.naming import checked_name, free_name
 from ..model.optics import catalogue
 from ..model.scene import Dab, Dielectric, Diffuse, Material, Mirror, Scene, SceneObject, Vec3
@@ -157,15 +157,7 @@ def with_dabs(scene: Scene, index: int, dabs: tuple[Dab, ...]) -> Scene:
     if not item.material.receives:
         raise UserError(f"'{item.name}' is not diffuse: the dispersion brush paints on what receives the caustic")
     for dab in dabs[shared:]:
-        if not all(map(math.isfinite, (*dab.position, dab.radius, dab.log2_gain, dab.falloff, dab.erase))):
-            raise UserError(f"'{item.name}': a touch of the brush holds a number that is not finite")
-        if not (0.0 < dab.radius <= MAX_LENGTH and abs(dab.log2_gain) <= MAX_DAB_LOG2):
-            raise UserError(
-                f"'{item.name}': a touch of the brush needs a radius above 0 and a gain within ±{MAX_DAB_LOG2:g} "
-                "doublings"
-            )
-        if not (0.0 <= dab.falloff <= 1.0 and 0.0 <= dab.erase <= 1.0):
-            raise UserError(f"'{item.name}': falloff and eraser of the brush must be between 0 and 1")
+        check_dab(dab, item.name)
     return changed(scene, index, local_dispersion=dabs)
 
 

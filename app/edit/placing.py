@@ -11,8 +11,8 @@ from typing import Literal
 import numpy as np
 
 from ..base.errors import UserError
-from ..model.contacts import world_bounds
 from ..model.scene import Light, Scene
+from ..model.scene_defaults import bounds_of
 from ..model.vectors import unit, vec3
 from .lights import set_light
 from .matrices import nearest_orthogonal
@@ -48,7 +48,7 @@ def frame_of(scene: Scene, selection: Selection, is_local: bool) -> np.ndarray:
             frame[:3, :3] = light.axes()
         return frame
     item = scene.objects[selection.index]
-    frame[:3, 3] = world_bounds(item).mean(axis=0)
+    frame[:3, 3] = item.world_bounds.mean(axis=0)
     if is_local:
         frame[:3, :3] = _nearest_rotation(item.object_to_world[:3, :3])
     return frame
@@ -59,8 +59,7 @@ def light_place(scene: Scene, light: Light) -> np.ndarray:
     if light.has_place:
         return np.asarray(light.position, float)
     chosen = [o for o in scene.objects if o.material.is_specular] or list(scene.objects)
-    bounds = np.stack([world_bounds(item) for item in chosen])
-    low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+    low, high = bounds_of(chosen)
     return 0.5 * (low + high) - 0.9 * float(np.linalg.norm(high - low)) * unit(light.direction)
 
 

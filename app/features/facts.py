@@ -9,7 +9,6 @@ from typing import Protocol
 
 import numpy as np
 
-from ..model.contacts import world_bounds
 from ..model.curved_solids import Face, curved_solids
 from ..model.environment_light import why_no_bounces, why_no_environment_light
 from ..model.geometry.outline import convex_outline
@@ -275,7 +274,7 @@ def in_view(item: SceneObject, camera: Camera, aspect: float) -> bool:
     """Whether the camera may see the object's bounding box: False only where one side of the view leaves out all of
     it."""
     right, up, forward = camera_frame(camera)
-    low, high = world_bounds(item)
+    low, high = item.world_bounds
     corners = np.array(np.meshgrid(*zip(low, high, strict=True), indexing="ij")).reshape(3, 8).T - np.array(
         camera.position
     )

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.contacts import world_bounds
 from ..model.scene import Scene
 
 
@@ -22,7 +21,7 @@ class GpuSpace:
     def of(scene: Scene) -> GpuSpace:
         """The space in which the specular objects (else everything) have about unit radius."""
         chosen = [o for o in scene.objects if o.material.is_specular] or list(scene.objects)
-        bounds = np.stack([world_bounds(o) for o in chosen])
+        bounds = np.stack([o.world_bounds for o in chosen])
         low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
         radius = 0.5 * float(np.linalg.norm(high - low))
         return GpuSpace(0.5 * (low + high), 2.0 ** -float(np.round(np.log2(radius))) if radius > 0 else 1.0)

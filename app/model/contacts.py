@@ -21,12 +21,6 @@ between a glass and its table."""
 _PAIRS_AT_ONCE = 1 << 20
 
 
-def world_bounds(item: SceneObject) -> np.ndarray:
-    """World axis-aligned bounds, float64 (2, 3)."""
-    points = item.world_vertices
-    return np.stack([points.min(axis=0), points.max(axis=0)])
-
-
 def overlapping_solids(scene: Scene) -> list[int]:
     """Indices of dielectric objects whose bounds overlap or touch those of another one, or that may touch a surface
     that is not glass: a ray keeps a bit for each, up to 32 of them, those among glass first."""
@@ -41,7 +35,7 @@ def contacts(scene: Scene) -> list[tuple[int, int]]:
     objects = scene.objects
     if not objects:
         return []
-    bounds = np.stack([world_bounds(item) for item in objects])
+    bounds = np.stack([item.world_bounds for item in objects])
     specular = np.array([item.material.is_specular for item in objects])
     chosen = bounds[specular] if specular.any() else bounds
     slack = 0.5 * _SLACK * float(np.linalg.norm(chosen[:, 1].max(axis=0) - chosen[:, 0].min(axis=0)))
@@ -72,7 +66,7 @@ def standing(scene: Scene) -> list[tuple[int, int]]:
     receivers = [i for i, item in enumerate(scene.objects) if item.material.receives]
     if not receivers:
         return []
-    bounds = np.stack([world_bounds(item) for item in scene.objects], axis=1)
+    bounds = np.stack([item.world_bounds for item in scene.objects], axis=1)
     slack = _STANDING_SLACK * np.ptp(bounds, axis=0).max(axis=1, keepdims=True)
     return [(i, int(j)) for i in receivers for j in np.flatnonzero(_meet(bounds[:, i], bounds, slack)) if i != j]
 
@@ -95,7 +89,7 @@ def _meeting_solids(scene: Scene, indices: list[int]) -> Iterator[np.ndarray]:
     """Pairs (P, 2) among `indices`."""
     if len(indices) < 2:
         return
-    bounds = np.stack([world_bounds(scene.objects[i]) for i in indices])
+    bounds = np.stack([scene.objects[i].world_bounds for i in indices])
     slack = _SOLID_SLACK * np.ptp(bounds, axis=(0, 1)).max()
     yield from _meeting(bounds, 2.0 * slack)
 

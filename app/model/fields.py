@@ -210,3 +210,12 @@ def write_fields(parts: Iterable[Part], value: Any, path: Path | None = None) ->
     for part in parts:
         values |= part.write(value, path)
     return values
+
+
+def check_numbers(parts: Iterable[Part], value: Any, who: str) -> None:
+    """Raise UserError, which begins with `who`, for a number of `value` that no scene file could hold."""
+    for number in (part for part in parts if isinstance(part, Number)):
+        found = float(getattr(value, number.attribute))
+        if limit := number.broken_limit(found):
+            what = number.attribute.removesuffix("_deg").replace("_", " ")
+            raise UserError(f"{who}{what} is {found:g} but must be {limit}")

@@ -17,8 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from .fields import Number, Vector, read_fields, write_fields
-from .io.scene_table import SceneTable
+from ..base.errors import UserError
+from .fields import Number, Vector, check_numbers, read_fields, write_fields
+from .io.scene_table import MAX_MAGNITUDE, SceneTable
 from .scene import Dab, Material, SceneObject
 from .vectors import frozen
 
@@ -266,7 +267,7 @@ def read_dabs(table: SceneTable, material: Material) -> tuple[Dab, ...]:
 
 _FIELDS = (
     Vector("position"),
-    Number("radius", above=0.0),
+    Number("radius", above=0.0, at_most=MAX_MAGNITUDE),
     Number("falloff", 0.5, at_least=0.0, at_most=1.0),
     # An eraser's own gain counts for nothing, but is kept where it is not the default.
     Number("log2_gain", 0.0, optional=True, at_least=-MAX_DAB_LOG2, at_most=MAX_DAB_LOG2),
@@ -278,6 +279,13 @@ def _read_dab(table: SceneTable) -> Dab:
     dab = Dab(**read_fields(_FIELDS, table))
     table.finish("a touch of the dispersion brush")
     return dab
+
+
+def check_dab(dab: Dab, name: str) -> None:
+    """Raise UserError where no scene file could hold a dab on the object called `name`."""
+    if not all(map(math.isfinite, dab.position)):
+        raise UserError(f"'{name}': a touch of the brush has a position that is not finite")
+    check_numbers(_FIELDS, dab, f"'{name}': of a touch of the brush ")
 
 
 def describe_dabs(dabs: Sequence[Dab]) -> list[dict[str, Any]]:

@@ -15,7 +15,6 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from .contacts import world_bounds
 from .environment import direction_of, texel_solid_angles
 from .lights.directional import SUN_DIAMETER_DEG, DirectionalLight
 from .lights.light import Light
@@ -119,7 +118,7 @@ def _with_panorama_lights(scene: Scene) -> Scene:
     found, rest = _found[environment]
     if not found or len(scene.lights) + len(found) > MAX_LIGHTS:  # no photon could name one more
         return scene
-    bounds = np.array([world_bounds(item) for item in scene.objects] or np.zeros((1, 2, 3)))
+    bounds = np.array([item.world_bounds for item in scene.objects] or np.zeros((1, 2, 3)))
     low, high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
     # In steps, so that most edits leave them where they are.
     distance = 2.0 ** math.ceil(math.log2(_FAR * max(0.5 * float(np.linalg.norm(high - low)), 1e-6)))

@@ -101,6 +101,12 @@ class SceneObject:
         return self.mesh.vertices @ self.object_to_world[:3, :3].T + self.object_to_world[:3, 3]
 
     @property
+    def world_bounds(self) -> np.ndarray:
+        """Lowest and highest corner of the box along the world's axes, float64 (2, 3)."""
+        points = self.world_vertices
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    @property
     def stretch(self) -> np.ndarray:
         """float64 (3, 3): what its matrix does to the mesh before it is turned, symmetric."""
         _, sizes, right = np.linalg.svd(self.object_to_world[:3, :3])

@@ -53,14 +53,8 @@ _FLAT = 0.1
 
 def bounds_of(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner of all `objects` in the world, float64 (3,) each."""
-    low, high = _bounds_of_each(objects)
-    return low.min(axis=0), high.max(axis=0)
-
-
-def _bounds_of_each(objects: Sequence[SceneObject]) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corners in the world, float64 (n, 3) each."""
-    points = [o.world_vertices for o in objects]
-    return np.array([p.min(axis=0) for p in points]), np.array([p.max(axis=0) for p in points])
+    bounds = np.stack([item.world_bounds for item in objects])
+    return bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
 
 
 def environment_of(objects: Sequence[SceneObject]) -> Surroundings:
@@ -80,7 +74,7 @@ def parts_of(objects: Sequence[SceneObject]) -> list[SceneObject]:
 
     if len(objects) < 2:
         return list(objects)
-    low, high = _bounds_of_each(objects)
+    low, high = np.stack([item.world_bounds for item in objects], axis=1)
     # Of all others, for each: the lowest, but the second lowest for the lowest itself. A file may have many thousands.
     lowest, highest = np.partition(low, 1, axis=0)[:2], -np.partition(-high, 1, axis=0)[:2]
     others_low = np.where(low == lowest[0], lowest[1], lowest[0])

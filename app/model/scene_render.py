@@ -5,8 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from ..base.errors import UserError
-from .fields import Flag, Integer, Number, Part, read_fields, write_fields
+from .fields import Flag, Integer, Number, Part, check_numbers, read_fields, write_fields
 from .io.scene_table import SceneTable
 from .scene import RenderDefaults, Vec3
 
@@ -71,10 +70,7 @@ _FIELDS = (
 def check_render(render: RenderDefaults) -> None:
     """Raise UserError for a number that no scene file could hold."""
     sides = (Integer(side, at_least=1, at_most=MAX_PICTURE_SIDE) for side in ("width", "height"))
-    for number in (*sides, *(field for field in _FIELDS if isinstance(field, Number))):
-        value = getattr(render, number.attribute)
-        if limit := number.broken_limit(value):
-            raise UserError(f"{number.attribute.replace('_', ' ')} is {value:g} but must be {limit}")
+    check_numbers((*sides, *_FIELDS), render, "")
 
 
 def read_render(table: SceneTable | None) -> RenderDefaults:

@@ -15,7 +15,6 @@ import numpy as np
 from ..gpu import bindings, shader
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.scene_records import SCENE_STRUCTS
-from ..model.contacts import world_bounds
 from .environment_places import ALL_PARTS, PLACE, EnvironmentPlaces
 
 _AT_ONCE = 4096
@@ -58,7 +57,7 @@ def _near_things(buffers: SceneBuffers, places: np.ndarray) -> np.ndarray:
     found = np.zeros(len(places), bool)
     position, side = places["position"], np.linalg.norm(places["span_u"], axis=1)[:, None]
     for index, item in enumerate(buffers.scene.objects):
-        low, high = buffers.space.to_gpu(world_bounds(item))
+        low, high = buffers.space.to_gpu(item.world_bounds)
         found |= ((position > low - side) & (position < high + side)).all(axis=1) & (places["object"] != index)
     return found
 

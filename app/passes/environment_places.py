@@ -16,7 +16,6 @@ import numpy as np
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.schema import Field, Struct
 from ..gpu.tiles import pack
-from ..model.contacts import world_bounds
 from ..model.geometry.charts import DEFAULT_GUTTER, ChartAtlas, build_charts
 from ..model.scene import SceneObject
 from ..model.scene_checks import contains
@@ -211,7 +210,7 @@ def _is_solid(buffers: SceneBuffers, item: SceneObject) -> bool:
         return is_closed
     within = [np.array(light.position) for light in scene.lights] + [np.array(scene.camera.position)]
     others = {other.name: other.whole for other in scene.objects if other.name != item.name}
-    within += [world_bounds(other).mean(axis=0) for other in others.values()]
+    within += [other.world_bounds.mean(axis=0) for other in others.values()]
     return not any(contains(item, point) for point in within)
 
 
@@ -224,7 +223,7 @@ def _windows(buffers: SceneBuffers, index: int, frame: PlaneFrame) -> list[Windo
     for other, item in enumerate(buffers.scene.objects):
         if other == index:
             continue
-        box = buffers.space.to_gpu(world_bounds(item))
+        box = buffers.space.to_gpu(item.world_bounds)
         corners = np.array(np.meshgrid(*box.T, indexing="ij")).reshape(3, 8).T
         flat = frame.project(corners)
         # A shadow under a uniform sky has nearly faded as far beside a thing as that is high, beside one that hovers

@@ -17,7 +17,6 @@ from ..gpu.context import Context
 from ..gpu.gpu_space import GpuSpace
 from ..gpu.records import FLIGHT, MAX_BANDS
 from ..gpu.scene_buffers import SceneBuffers
-from ..model.contacts import world_bounds
 from ..model.optics.spectral_tables import SpectralAxis, cumulative
 from ..model.scene import Scene
 from ..model.settings import RenderSettings
@@ -192,7 +191,7 @@ def _thinned(records: np.ndarray, lattices: int) -> np.ndarray:
 def _bounds(scene: Scene) -> np.ndarray:
     """Lowest and highest corner (2, 3), world, of objects, lights and the camera."""
     places = [scene.camera.position, *(light.position for light in scene.lights if light.has_place)]
-    points = np.concatenate([np.asarray(places, float), *(world_bounds(item) for item in scene.objects)])
+    points = np.concatenate([np.asarray(places, float), *(item.world_bounds for item in scene.objects)])
     return np.stack([points.min(axis=0), points.max(axis=0)])
 
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.contacts import world_bounds
 from ..model.optics.glass import LINE_D_NM
 from ..model.scene import Light
 from .emission_domain import orthonormal_frame
@@ -43,7 +42,7 @@ class RayFan:
 
     def __init__(self, paths: RayPaths) -> None:
         self._scene, self._paths = paths.scene.scene, paths
-        bounds = np.stack([world_bounds(item) for item in self._scene.objects])
+        bounds = np.stack([item.world_bounds for item in self._scene.objects])
         self._points = [item.world_vertices for item in self._scene.objects]
         self._low, self._high = bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
 

@@ -9,7 +9,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..gpu.tiles import Tile
-from ..model.contacts import world_bounds
 from ..model.optics.colorimetry import rgb709_to_xyz_matrix
 from ..model.scene import Camera
 from ..model.settings import RenderSettings
@@ -221,7 +220,7 @@ def _may_be_hidden(light: LightPass, receiver: int, camera: Camera, places: np.n
     with np.errstate(divide="ignore", invalid="ignore"):
         for index, item in enumerate(light.scene.objects):
             if index != receiver:
-                low, high = ((bound - start) / way for bound in world_bounds(item))
+                low, high = ((bound - start) / way for bound in item.world_bounds)
                 enter = np.fmax.reduce(np.minimum(low, high), axis=1)
                 leave = np.fmin.reduce(np.maximum(low, high), axis=1)
                 hidden |= (enter <= np.minimum(leave, 1.0)) & (leave >= 0.0)

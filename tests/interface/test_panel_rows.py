@@ -8,7 +8,6 @@ import pytest
 from imgui_bundle import imgui
 from spectrasplat.edit.state import Selection, State
 from spectrasplat.gpu.context import Context
-from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.scene import Dielectric, Diffuse, Grating, Polariser
 from spectrasplat.model.scene_camera import camera_frame
 from spectrasplat.ui.panels.inspector import draw_inspector
@@ -109,7 +108,7 @@ def test_the_lens_is_opened_and_focused(gl) -> None:
         assert camera.focus_distance is None and rig.was_held
         rig.frame(2)
         rig.click("Focus on the selected")
-        low, high = world_bounds(rig.state.scene.objects[0])
+        low, high = rig.state.scene.objects[0].world_bounds
         depth = camera_frame(camera)[2] @ (0.5 * (low + high) - camera.position)
         assert rig.state.camera.focus_distance == pytest.approx(depth)
         rig.type_into("Focus distance", "2.5")

@@ -19,7 +19,6 @@ from spectrasplat.edit import requests
 from spectrasplat.edit.opening import import_objects
 from spectrasplat.edit.preferences import load_settings
 from spectrasplat.gpu.context import Context
-from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.optics import catalogue
 from spectrasplat.ui import layout
@@ -207,9 +206,9 @@ def test_a_mesh_joins_the_scene_beside_the_others(tmp_path: Path) -> None:
     once = import_objects(scene, tmp_path / "cube.obj")
     assert [item.name for item in once.objects] == ["prism", "table", "cube"]
     assert once.lights == scene.lights and once.camera == scene.camera
-    low, high = world_bounds(once.objects[2])
+    low, high = once.objects[2].world_bounds
     assert 0.2 < np.max(high - low) < 3.0  # a cube of ninety units is millimetres
-    other_low, other_high = world_bounds(scene.objects[0])
+    other_low, other_high = scene.objects[0].world_bounds
     assert (low >= other_high - 1e-6).any() or (high <= other_low + 1e-6).any()
     twice = import_objects(once, SCENES / "lens.toml")
     assert [item.name for item in twice.objects[3:]] == ["lens", "table 2"]

@@ -239,9 +239,7 @@ def test_the_gizmo_snaps_with_ctrl_and_scales_about_the_middle(gl) -> None:
 
 
 def _middle(state: State, index: int) -> np.ndarray:
-    from spectrasplat.model.contacts import world_bounds
-
-    return world_bounds(state.scene.objects[index]).mean(axis=0)
+    return state.scene.objects[index].world_bounds.mean(axis=0)
 
 
 def test_the_gizmo_moves_a_light_that_is_clicked(gl) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from spectrasplat.base.errors import UserError
 from spectrasplat.edit.opening import import_objects
-from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.materials.diffuse import Diffuse
 from spectrasplat.model.optics import catalogue
@@ -113,7 +112,7 @@ def test_materials_say_what_is_glass_and_the_colour_of_the_rest(tmp_path: Path) 
     assert isinstance(pot.material, Dielectric) and pot.material.dispersion.n_d == pytest.approx(2.4)
     assert pot.material.dispersion.V_d == pytest.approx(catalogue.find("N-BK7").V_d, rel=0.01)
     assert isinstance(handle.material, Diffuse) and handle.material.reflectance_rgb == (0.4, 0.2, 0.08)
-    assert table.name == "table" and world_bounds(table)[1][2] < 0.0 + 1e-6  # though the handle is diffuse too
+    assert table.name == "table" and table.world_bounds[1][2] < 0.0 + 1e-6  # though the handle is diffuse too
     assert any("make glass of 'pot'" in note for note in scene.notes)
     assert any("line 10" in note and "'Kd'" in note for note in scene.notes)
 
@@ -153,6 +152,6 @@ def test_parts_are_imported_together(tmp_path: Path) -> None:
     larger = import_objects(scene, tmp_path / "own.obj")
     added = larger.objects[len(scene.objects) :]
     assert [item.name for item in added] == ["body 2", "lid 2"]
-    body, lid = (world_bounds(item) for item in added)
+    body, lid = (item.world_bounds for item in added)
     assert np.allclose(lid - body, [3.0, 0.0, 0.0])
-    assert not np.allclose(body, world_bounds(scene.objects[0]))
+    assert not np.allclose(body, scene.objects[0].world_bounds)

@@ -11,7 +11,6 @@ import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.bench.random_scenes import random_scene, random_scenes, scene_name
 from spectrasplat.bench.random_solids import PLAIN, WIDER
-from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
 
 MANY = 60
@@ -35,7 +34,7 @@ def test_a_seed_and_a_number_say_the_scene(tmp_path: Path) -> None:
 
 def test_nothing_stands_in_another(tmp_path: Path) -> None:
     for scene in random_scenes(12, 9, tmp_path).values():
-        bounds = [(o.name, world_bounds(o)) for o in scene.objects if not o.material.receives]
+        bounds = [(o.name, o.world_bounds) for o in scene.objects if not o.material.receives]
         for (a, one), (b, other) in combinations(bounds, 2):
             middle = 0.5 * (one.sum(axis=0) - other.sum(axis=0))
             # Boxes of turned solids may meet where these do not.
@@ -48,7 +47,7 @@ def test_scenes_of_all_kinds_load_and_stand(tmp_path: Path) -> None:
         assert any(o.material.is_specular for o in scene.objects) and any(o.material.receives for o in scene.objects)
         # Data that end within the spectrum, and dispersion wider than any glass has: asked for.
         assert all("nearest value" in note or "nature does not" in note for note in scene.notes), scene.notes
-        low = {o.name: world_bounds(o)[0, 2] for o in scene.objects if o.name not in ("table", "wall")}
+        low = {o.name: o.world_bounds[0, 2] for o in scene.objects if o.name not in ("table", "wall")}
         assert min(low.values()) > 0.0, (name, low)
 
 

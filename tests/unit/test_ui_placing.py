@@ -15,7 +15,6 @@ from spectrasplat.edit import measuring, placing
 from spectrasplat.edit.lessons import lesson, lessons
 from spectrasplat.edit.matrices import decompose, rotation_matrix, with_position, with_rotation, with_scale
 from spectrasplat.edit.state import Selection, State
-from spectrasplat.model.contacts import world_bounds
 from spectrasplat.model.io.scene_file import load_scene
 from spectrasplat.model.io.scene_table import SceneTable
 from spectrasplat.model.placement import read_placement
@@ -106,7 +105,7 @@ def test_a_frame_is_right_handed_and_in_the_middle() -> None:
             frame = placing.frame_of(SCENE, selection, is_local)
             assert frame[:3, :3] @ frame[:3, :3].T == pytest.approx(np.eye(3), abs=1e-12)
             assert np.linalg.det(frame[:3, :3]) == pytest.approx(1.0)
-    assert placing.frame_of(SCENE, PRISM, True)[:3, 3] == pytest.approx(world_bounds(SCENE.objects[0]).mean(axis=0))
+    assert placing.frame_of(SCENE, PRISM, True)[:3, 3] == pytest.approx(SCENE.objects[0].world_bounds.mean(axis=0))
     assert placing.frame_of(SCENE, SLIT, False)[:3, 3] == pytest.approx(SCENE.lights[0].position)
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, cast
 import numpy as np
 
 from ...base.errors import UserError
-from ..fields import Number, Part
+from ..fields import Number, Part, check_numbers
 from ..io.scene_table import MAX_MAGNITUDE
 from ..optics.spectrum import Spectrum
 from ..vectors import Vec3, unit
@@ -219,13 +219,10 @@ class Light:
 
     def check(self) -> None:
         """Raise UserError for a place, size or angle that no scene file could hold."""
-        values = {number: float(getattr(self, number.attribute)) for number in self.numbers}
-        if not all(math.isfinite(v) and abs(v) <= MAX_MAGNITUDE for v in (*self.position, *values.values())):
+        values = (float(getattr(self, number.attribute)) for number in self.numbers)
+        if not all(math.isfinite(v) and abs(v) <= MAX_MAGNITUDE for v in (*self.position, *values)):
             raise UserError(f"light '{self.name}': its place or size is not finite or too large; choose another")
-        for number, value in values.items():
-            if limit := number.broken_limit(value):
-                what = number.attribute.removesuffix("_deg").replace("_", " ")
-                raise UserError(f"light '{self.name}': its {what} is {value:g} but must be {limit}")
+        check_numbers(self.numbers, self, f"light '{self.name}': its ")
 
     def power(self, key: PowerKey) -> float:
         """Its power as `key` states it."""

@@ -12,7 +12,6 @@ from ...base.colour_maps import FALSE_COLOUR, sample
 from ...edit import edits
 from ...edit.camera_controls import focus_at
 from ...edit.state import SOLO_START_NM, Display, State, ToneCurve
-from ...model.contacts import world_bounds
 from ...model.scene_render import MAX_GLARE
 from .. import theme
 from ..view_model import ViewModel
@@ -210,7 +209,7 @@ def _camera(state: State) -> State:
     may_focus = selected.kind == "object" and selected.index < len(state.scene.objects)
     tip = "Click a thing in the picture, then this: it is in focus."
     if camera.lens_radius > 0.0 and widgets.button("Focus on the selected", tip=tip, enabled=may_focus):
-        camera = focus_at(camera, world_bounds(state.scene.objects[selected.index]).mean(axis=0))
+        camera = focus_at(camera, state.scene.objects[selected.index].world_bounds.mean(axis=0))
     if widgets.button("Scene's own view", tip="Back to the camera that the scene was saved with (0).", width=-1):
         camera = state.scene.camera
     return replace(state, camera=camera)
