@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..base.errors import UserError
+from ..model.geometry.charts import shelves
 
 MAX_SIDE = 4096
 GUARD = 1
@@ -35,32 +38,17 @@ def pack(sizes: Sequence[tuple[int, int]], max_side: int = MAX_SIDE) -> tuple[li
     """
     if not sizes:
         return [], (GUARD, GUARD)
-    widest = max(width for width, _ in sizes) + 2 * GUARD
-    area = sum((width + GUARD) * (height + GUARD) for width, height in sizes)
-    best: tuple[int, list[Tile], tuple[int, int]] | None = None
-    for factor in (0.0, 1.0, 1.2, 1.5, 2.0, 1e9):
-        limit = min(max(widest, int(factor * area**0.5)), max_side)
-        tiles, size = _shelves(sizes, limit)
-        if size[0] <= max_side and size[1] <= max_side and (best is None or size[0] * size[1] < best[0]):
-            best = (size[0] * size[1], tiles, size)
-    if best is None:
+    padded = np.array(sizes) + GUARD
+    widest, area = int(padded[:, 0].max()), int(padded.prod(axis=1).sum())
+    most = max_side - GUARD
+    widths = {min(max(widest, int(factor * area**0.5) - GUARD), most) for factor in (0.0, 1.0, 1.2, 1.5, 2.0, 1e9)}
+    tried = [shelves(padded, width) for width in sorted(widths)]
+    held = [(corners, size) for corners, size in tried if max(size) <= most]
+    if not held:
         raise UserError(
             f"the caustic maps need {area / 1e6:.1f} M texels and do not fit a texture of {max_side}²; choose a "
             "smaller picture or map"
         )
-    return best[1], best[2]
-
-
-def _shelves(sizes: Sequence[tuple[int, int]], limit: int) -> tuple[list[Tile], tuple[int, int]]:
-    tiles: list[Tile] = [Tile(0, 0, 0, 0)] * len(sizes)
-    x = y = GUARD
-    shelf = widest = 0
-    for index in sorted(range(len(sizes)), key=lambda i: (-sizes[i][1], -sizes[i][0], i)):
-        width, height = sizes[index]
-        if x > GUARD and x + width + GUARD > limit:
-            x, y, shelf = GUARD, y + shelf + GUARD, 0
-        tiles[index] = Tile(x, y, width, height)
-        x += width + GUARD
-        shelf = max(shelf, height)
-        widest = max(widest, x)
-    return tiles, (widest, y + shelf + GUARD)
+    corners, (width, height) = min(held, key=lambda each: (each[1][0] + GUARD) * (each[1][1] + GUARD))
+    tiles = [Tile(x + GUARD, y + GUARD, *size) for (x, y), size in zip(corners.tolist(), sizes, strict=True)]
+    return tiles, (width + GUARD, height + GUARD)

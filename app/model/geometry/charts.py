@@ -144,12 +144,13 @@ def _pack(extents: np.ndarray, gutter: int) -> tuple[np.ndarray, tuple[int, int]
     widest = int(sizes[:, 0].max())
     tries = 24 if len(sizes) <= 256 else 4
     widths = {max(widest, int(side * factor)) for factor in np.linspace(1.0, 2.2, tries)}
-    packed = [_shelves(sizes, width) for width in sorted(widths)]
+    packed = [shelves(sizes, width) for width in sorted(widths)]
     return min(packed, key=lambda result: result[1][0] * result[1][1])
 
 
-def _shelves(sizes: np.ndarray, width: int) -> tuple[np.ndarray, tuple[int, int]]:
-    """Shelves of at most `width` texels, tallest rectangles first."""
+def shelves(sizes: np.ndarray, width: int) -> tuple[np.ndarray, tuple[int, int]]:
+    """Rectangles of `sizes`, int (C, 2), on shelves of at most `width` texels, tallest first: lower corners (C, 2), and
+    the size of all."""
     places = np.zeros_like(sizes)
     x = y = shelf = widest = 0
     for chart in np.lexsort((-sizes[:, 0], -sizes[:, 1])):
