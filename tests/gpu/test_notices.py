@@ -14,10 +14,10 @@ from spectrasplat.__main__ import main
 from spectrasplat.base.errors import DeviceError, UserError, sentence_of
 from spectrasplat.gpu.context import check_device
 from spectrasplat.model.geometry.primitives import box, plane
-from spectrasplat.model.lights import AreaLight, PointLight
+from spectrasplat.model.lights import AreaLight
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.scene import Diffuse, Mirror, Scene, SceneObject
+from spectrasplat.model.scene import Mirror, Scene, SceneObject
 from spectrasplat.model.scene_checks import check_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.frames import FrameRenderer, Picture
@@ -68,19 +68,6 @@ def test_a_picture_that_lacks_what_its_maps_hold_is_told(gl) -> None:
         (told,) = picture_notices(light, scene.camera, SETTINGS, 0.0 * right)
         assert "black" in told
         assert light_notices(light) == []
-
-
-@pytest.mark.parametrize("height", [1e-6, 1e-5, 1e-2])
-def test_a_lamp_on_the_floor_shines(gl, height: float) -> None:
-    lamp = PointLight("lamp", WHITE, position=(0.3, 0.0, height))
-    ceiling = np.eye(4)
-    ceiling[2, 3] = 4.0
-    scene = stage(BLOCK, SceneObject("ceiling", plane(8.0, 8.0), Diffuse(), ceiling), lights=[lamp])
-    with light_pass(gl, scene, SETTINGS) as (light, _):
-        light.begin(8192, 1)
-        light.run_pass(0, 8192, lambda _: True)
-        ended = light.stats.tally.ended
-        assert ended["deposited"] > 0.3 * light.stats.tally.emitted
 
 
 def test_scenes_that_can_give_no_picture_are_refused() -> None:

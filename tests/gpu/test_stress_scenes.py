@@ -80,11 +80,10 @@ def test_a_pile_of_sixteen_keeps_its_light(gl) -> None:
     assert found.broken() == []
 
 
-@pytest.mark.parametrize(("name", "severity", "most"), [("scale", 1e-4, 1e-3), ("rotation", 90.0, 0.014)])
-def test_scene_may_be_of_any_size_and_turned(gl, name: str, severity: float, most: float) -> None:
-    (found,) = swept(name).only(severity).measure(gl)
+def test_scene_may_be_of_any_size(gl) -> None:
+    (found,) = swept("scale").only(1e-4).measure(gl)
     assert found.broken() == []
-    assert found.errors["picture"] < most
+    assert found.errors["picture"] < 1e-3
 
 
 def test_passes_add_up(gl) -> None:
@@ -156,7 +155,10 @@ def test_the_whole_run_keeps_every_promise(tmp_path: Path, capsys) -> None:
     assert sum(len(case["measurements"]) for case in held["cases"]) > 200
 
 
-LOSSES = (*(case.only(1e-5, 0.0) for case in losses.CONTACTS), losses.lamp_on_floor.only(1e-2, 0.0), losses.dark_lights)
+QUICK = "contact-mirror", "contact-black-box"
+"""The others of the sweep are as those of test_contact.py."""
+LOSSES = [case.only(1e-5, 0.0) for case in losses.CONTACTS if case.name in QUICK]
+LOSSES.append(losses.lamp_on_floor.only(1e-2, 1e-6, 0.0))
 
 
 @pytest.mark.parametrize("case", LOSSES, ids=lambda case: case.name)

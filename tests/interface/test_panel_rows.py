@@ -65,15 +65,6 @@ def test_a_grating_is_given_a_profile(gl: Context) -> None:
         assert material(rig).blaze_nm == pytest.approx(480.0)
 
 
-def test_a_screen_can_be_made_a_grating(gl: Context) -> None:
-    with PanelRig(gl, draw_inspector, scene_state("spectrometer", Diffuse)) as rig:
-        rig.click("Kind##combo" if "Kind##combo" in rig.items.items else "Kind")
-        rig.frame(2)
-        rig.click("Grating")
-        rig.frame(2)
-        assert material(rig) == Grating()
-
-
 def test_a_prism_is_made_of_calcite_and_turned(gl: Context) -> None:
     with PanelRig(gl, draw_inspector, scene_state("prism", Dielectric), (420, 1500)) as rig:
         rig.click("Crystal")
