@@ -174,7 +174,7 @@ OF_LIBRARY = {
         "lib/film.glsl",
         "from = to = x.xyzz;",
         "from = to = x.xyzz;\n    } else {\n        from = to = x.xyzz;",
-        "gpu/test_thin_films.py::test_a_patch_of_sun_behind_a_film[etalon-srd]",
+        "gpu/test_thin_films.py::test_patches_of_sun_behind_films",
     ),
     "orders of a grating to the other side": Mutant(
         "lib/grating.glsl",
