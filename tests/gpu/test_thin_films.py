@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +21,7 @@ from spectrasplat.stress.rigs.camera_probe import PROBE, daylight_mean, render_p
 from spectrasplat.stress.rigs.probe import blocks
 
 from tests.gpu.camera_rig import at, shares_of_the_sun, sheets_in_a_furnace, tilted
+from tests.gpu.test_thin_sheets import PATCHES
 
 GLASS = constant(1.5)
 _SILVER = Layer(metals()["silver"], 25.0)
@@ -53,14 +55,17 @@ def shares(material: Material, cosine: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("names", "method"), [(tuple(SHEETS), "srd"), (("soap of 400 nm",), "hero"), (("silvered",), "stochastic-even")]
+    ("names", "tinted", "method"),
+    [(SHEETS, (), "srd"), (["soap of 400 nm"], ["sheet"], "hero"), (["silvered"], ["solid"], "stochastic-even")],
 )
-def test_patches_of_sun_behind_films(gl: Context, names: tuple[str, ...], method: str) -> None:
-    found = shares_of_the_sun(
-        gl, [[SceneObject("sheet", plane(1.0, 1.0), SHEETS[name], at(0.0, 0.0, 1.5))] for name in names], method
-    )
-    expected = np.array([daylight_mean(shares(SHEETS[name], 1.0)[1]) for name in names])
-    assert found == pytest.approx(expected, rel=0.01, abs=2e-3)
+def test_patches_of_sun_behind_films(gl: Context, names: Iterable[str], tinted: Iterable[str], method: str) -> None:
+    """Beside tinted glass without a film."""
+    stands = [[SceneObject("sheet", plane(1.0, 1.0), SHEETS[name], at(0.0, 0.0, 1.5))] for name in names]
+    expected = [daylight_mean(shares(SHEETS[name], 1.0)[1]) for name in names]
+    for name in tinted:
+        stands.append(list(PATCHES[name][0]))
+        expected.append(PATCHES[name][1])
+    assert shares_of_the_sun(gl, stands, method) == pytest.approx(np.array(expected), rel=0.012, abs=2e-3)
 
 
 def test_a_coated_block_lets_more_through(gl: Context) -> None:
