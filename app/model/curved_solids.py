@@ -40,9 +40,11 @@ class Face(NamedTuple):
         return not self.rows.any()
 
     def moved(self, linear_map: np.ndarray, offset: np.ndarray) -> Face:
-        """The face where p is mapped to `linear_map` (3, 3) p + `offset` (3,)."""
-        inverse = np.linalg.inv(linear_map)
-        return Face(self.rows @ inverse, linear_map @ self.origin + offset, inverse.T @ self.linear, self.constant)
+        """The face where p is mapped to `linear_map` (3, 3) p + `offset` (3,); its gradient keeps its length, so that
+        single precision holds it whatever a scene's unit is."""
+        inverse, size = np.linalg.inv(linear_map), abs(np.linalg.det(linear_map)) ** (1.0 / 3.0)
+        rows, linear = math.sqrt(size) * self.rows @ inverse, size * inverse.T @ self.linear
+        return Face(rows, linear_map @ self.origin + offset, linear, size * self.constant)
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         """To first order how far `points` (..., 3) lie outside it (...,)."""

@@ -77,6 +77,8 @@ FEWEST_COVERED = 14.0
 are then as broad as its light, and copies only distinguish that from a disc's."""
 MAX_POINTS = 1 << 16
 """Lattice points of a pilot, however little of the domain holds glass."""
+MORE = 16
+"""Times as many where none came to a receiver, before that is said."""
 PARTED_COPIES = 12.0
 """Points on a light all of whose light parts, for each root of photons in `MIN_LATTICE`: both what a lattice blurs and
 what lies between two points then shrink with more photons."""
@@ -122,8 +124,6 @@ def pilot_steps(
     weight. `for_maps`: all that is asked is where light lands, which a quarter of the points tells, and the spectrum's
     ends."""
     count = min(max(1, int(PHOTONS / domain.active_share)), MAX_POINTS)
-    # In as many slices as the batch needs: what a pilot finds must not depend on it.
-    slices = -(-count // trace.batch)
 
     def traced(
         band: Band,
@@ -141,6 +141,8 @@ def pilot_steps(
             flights += batch.flights
             fullness = max(fullness, batch.fullness)
 
+        # In as many slices as the batch needs: what a pilot finds must not depend on it.
+        slices = -(-count // trace.batch)
         piece = LatticeSlice(
             light, (band,), count, 0, 1, count, (0, 0), (0, 0), 0, 1, light_place=place, keeps_bands=True
         )
@@ -151,6 +153,9 @@ def pilot_steps(
 
     depth, everything = MAX_DEPTH, Band(0.0, 1.0, 0.5, power_w)
     whole, tally, flights, _ = yield from traced(everything, depth)
+    if not len(whole) and tally.emitted:  # perhaps its receiver is small
+        count *= MORE
+        whole, tally, flights, _ = yield from traced(everything, depth)
     if tally.ended["lost_depth"] > tally.ended["deposited"]:
         depth = trace.max_depth
         whole, _, flights, _ = yield from traced(everything, depth)

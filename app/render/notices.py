@@ -98,7 +98,10 @@ def light_notices(light: LightPass) -> list[str]:
     for index in light.survey.domains:
         name = light.scene.lights[index].name
         if light.buffers.light_power[index].band(0.0, 1.0)[3] > 0.0 and not len(light.survey.pilots[index].whole):
-            found.append(f"light '{name}': nothing that meets glass or mirrors reaches a receiver; it makes no caustic")
+            found.append(
+                f"light '{name}': of {light.survey.pilots[index].lattice_count:,} photons sent ahead none reaches a "
+                "receiver by way of glass or mirrors; it draws no caustic"
+            )
     outside = light.stats.outside_map_w
     drawn = light.stats.drawn_w
     if drawn and outside > LOST_SHARE * drawn:

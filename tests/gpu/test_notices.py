@@ -13,11 +13,11 @@ import pytest
 from spectrasplat.__main__ import main
 from spectrasplat.base.errors import DeviceError, UserError, sentence_of
 from spectrasplat.gpu.context import check_device
-from spectrasplat.model.geometry.primitives import box, plane
+from spectrasplat.model.geometry.primitives import box, plane, sphere
 from spectrasplat.model.lights import AreaLight
 from spectrasplat.model.optics.glass import constant
 from spectrasplat.model.optics.spectrum import illuminant
-from spectrasplat.model.scene import Mirror, Scene, SceneObject
+from spectrasplat.model.scene import Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.scene_checks import check_scene
 from spectrasplat.model.settings import RenderSettings
 from spectrasplat.render.frames import FrameRenderer, Picture
@@ -53,6 +53,22 @@ def test_a_light_whose_light_reaches_nothing_is_told(gl) -> None:
     mirror = SceneObject("mirror", plane(3.0, 3.0), Mirror(), facing_away)
     (told,) = notices(gl, stage(mirror))
     assert "'beam'" in told and "reaches a receiver" in told
+
+
+def test_a_receiver_narrower_than_the_first_photons_lie_apart_has_its_light(gl) -> None:
+    """A detector in a ball's light gets its share of a wider one's: 4,096 photons over the ball lie 0.015 apart."""
+
+    def deposited(side: float) -> float:
+        ball = solid("ball", sphere(radius=0.5), constant(1.5, "n"), (0.0, 0.0, 1.2))
+        place = np.eye(4)
+        place[:3, 3] = 0.053, 0.021, 0.0
+        scene = replace(stage(ball), objects=(ball, SceneObject("detector", plane(side, side), Diffuse(), place)))
+        with light_pass(gl, scene, SETTINGS) as (light, _):
+            light.begin(200_000, 1)
+            light.run_pass(0, 200_000, lambda _: True)
+            return light.stats.tally.ended["deposited"] / light.stats.tally.emitted
+
+    assert deposited(0.004) / 0.004**2 == pytest.approx(deposited(0.1) / 0.1**2, rel=0.2)
 
 
 def test_a_picture_that_lacks_what_its_maps_hold_is_told(gl) -> None:

@@ -117,6 +117,19 @@ def test_many_go_to_the_tree() -> None:
     assert len(curved_solids(scene_of(*row[1:]))) == MOST_FACES and not curved_solids(scene_of(*row))
 
 
+@pytest.mark.parametrize("name", ["ball", "ellipsoid", "lens"])
+def test_records_are_the_same_in_micrometres_and_in_metres(name: str) -> None:
+    """The shader normalises gradients whose square is above 1e-12: those of a bead of 1e-6 units were below."""
+    shape, sizes, _ = SHAPES[name]
+
+    def records(unit: float) -> np.ndarray:
+        scaled = {key: (unit * np.array(value)).tolist() for key, value in sizes.items()}
+        scene = scene_of(placed(described(shape, **scaled), (0.0, 0.0, 2.0 * unit)))
+        return Curved.of(scene, GpuSpace.of(scene), curved_solids(scene))[1]["PIECES"]
+
+    assert records(2.0**-20).tobytes() == records(1.0).tobytes() == records(2.0**20).tobytes()
+
+
 def test_features_hold_no_triangles_for_them() -> None:
     scene = scene_of(placed(described("sphere", radius=0.5)))
     exact, meshed = (Features.of(s, RenderSettings()) for s in (scene, as_triangles(scene)))
