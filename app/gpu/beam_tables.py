@@ -9,17 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..model.optics.spectral_tables import SpectralAxis
 from ..model.optics.spectrum import Spectrum
 from .map_channels import MapChannels
 from .splat_tables import FoldedSpectrum
-
-if TYPE_CHECKING:
-    import moderngl
 
 SAMPLES = 4097
 """Samples of a running integral, equally spaced over x in [0, 1]."""
@@ -63,8 +60,6 @@ class BeamTables:
         channels: MapChannels = MapChannels(),
     ) -> BeamTables:
         """Tables for the lights' spectra under each reflectance (401,) or None."""
-        import moderngl
-
         targets, x = channels.targets, np.linspace(0.0, 1.0, SAMPLES)
         folded = [[FoldedSpectrum.of(axis, light, each, channels) for each in reflectances] for light in lights]
         curves = np.stack([source.smooth.at(x) for of_light in folded for source in of_light])

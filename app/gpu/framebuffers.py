@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    import moderngl
+import moderngl
 
 
 def park(ctx: moderngl.Context) -> None:
@@ -31,8 +29,6 @@ def frame_of(ctx: moderngl.Context, texture: moderngl.Texture) -> moderngl.Frame
 @contextmanager
 def adding(ctx: moderngl.Context) -> Iterator[None]:
     """Within the block what is drawn is added to what there is."""
-    import moderngl
-
     ctx.enable_only(moderngl.BLEND)
     ctx.blend_equation = moderngl.FUNC_ADD, moderngl.FUNC_ADD
     ctx.blend_func = moderngl.ONE, moderngl.ONE

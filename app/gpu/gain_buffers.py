@@ -6,21 +6,16 @@ spectral bands of a path grow together and no gap opens between them.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+import moderngl
 import numpy as np
 
 from ..model.local_dispersion import GainGrid
 from ..model.optics.glass import LINE_D_NM
+from ..model.optics.spectral_tables import SpectralAxis
+from ..model.scene import Scene, SceneObject
+from .gpu_space import GpuSpace
 from .growing import filled
 from .records import GAIN_BOX
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..model.optics.spectral_tables import SpectralAxis
-    from ..model.scene import Scene, SceneObject
-    from .gpu_space import GpuSpace
 
 _BIND_BOXES, _BIND_GAINS = 9, 10
 

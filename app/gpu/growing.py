@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+import moderngl
 import numpy as np
 
 from . import shader
-
-if TYPE_CHECKING:
-    import moderngl
 
 
 def filled(ctx: moderngl.Context, before: moderngl.Buffer | None, data: np.ndarray) -> moderngl.Buffer:

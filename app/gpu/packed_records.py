@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+import moderngl
 import numpy as np
 
 from ..features.program_switches import switched
 from . import shader
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from .schema import Struct
+from .schema import Struct
 
 _GROUP = 64
 

@@ -12,12 +12,11 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import moderngl
 
 from .linker import linker_of
-
-if TYPE_CHECKING:
-    import moderngl
 
 _BYTES = 1 << 22
 _REPEATS = 8

@@ -13,18 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..model.optics.glass import LINE_D_NM, Dispersion, with_gain
 from ..model.optics.spectral_tables import SpectralAxis
+from ..model.optics.spectrum import Spectrum
 from .growing import filled
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..model.optics.spectrum import Spectrum
 
 Spans = list[list[tuple[float, float]]]
 """Ends of each light's bands in some spectral coordinate, ascending."""

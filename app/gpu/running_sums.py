@@ -5,19 +5,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
-from ..model.optics.spectral_tables import CELL_EDGES_NM
+from ..features.program_switches import Defines
+from ..model.optics.spectral_tables import CELL_EDGES_NM, SpectralAxis
+from ..model.optics.spectrum import Spectrum
 from . import shader
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..features.program_switches import Defines
-    from ..model.optics.spectral_tables import SpectralAxis
-    from ..model.optics.spectrum import Spectrum
 
 BIND_KNOTS, BIND_SUMS = 0, 1
 KNOTS = len(CELL_EDGES_NM)

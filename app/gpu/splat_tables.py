@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..model.optics.colorimetry import VISIBLE_NM
@@ -21,9 +21,6 @@ from ..model.optics.spectrum import Spectrum
 from . import shader
 from .growing import filled
 from .map_channels import MapChannels
-
-if TYPE_CHECKING:
-    import moderngl
 
 CUT = 3.0
 """Standard deviations that a splat reaches beyond its sweep (as in footprint.comp)."""

@@ -10,16 +10,14 @@ import os
 import time
 import weakref
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import moderngl
 
 from ..base.errors import UserError, suggestion
 from . import shader
 from .device_traits import DeviceTraits, is_software_renderer
 from .framebuffers import adding, park
 from .limits import Limits
-
-if TYPE_CHECKING:
-    import moderngl
 
 ENVIRONMENT_VARIABLE = "SPECTRASPLAT_SPLATS"
 FLOAT_ATOMICS = "GL_NV_shader_atomic_float"
@@ -116,8 +114,6 @@ def _from_environment() -> str:
 def blending_rate(ctx: moderngl.Context) -> float:
     """Fragments that the device adds to an RGBA32F texture a second, by the wall clock: the best of rounds that end
     when it is no longer slow, or after `_PATIENCE_S`."""
-    import moderngl
-
     texture = ctx.texture((_SIDE, _SIDE), 4, dtype="f4")
     framebuffer = ctx.framebuffer([texture])
     program = ctx.program(vertex_shader=_VERTEX, fragment_shader=_FRAGMENT)

@@ -9,29 +9,24 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import nullcontext
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..beams.polygons import BeamPolygons
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
+from ..gpu.beam_tables import BeamTables
 from ..gpu.context import check_device
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..gpu.framebuffers import adding
+from ..gpu.pass_timers import PassTimers
 from ..gpu.records import NONE
 from ..gpu.schema import Field, Struct
 from .beam_records import BEAM, PackedBeams, hull_areas, hull_boxes, levels, packed, texel_hulls
-from .plane_frame import TexelMap
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.beam_tables import BeamTables
-    from ..gpu.pass_timers import PassTimers
-    from .map_atlas import MapAtlas
-    from .map_layout import MapLayout
-    from .plane_frame import PlaneFrame
+from .map_atlas import MapAtlas
+from .map_layout import MapLayout
+from .plane_frame import PlaneFrame, TexelMap
 
 GROUP = 1 << 11
 """Polygons that are uploaded and drawn at a time: a software renderer sorts all of them into tiles before it draws."""
@@ -117,8 +112,6 @@ class BeamSplatter:
         check_device(self._ctx, f"drawing {len(polygons)} beam polygons")
 
     def _draw(self, beams: PackedBeams, tables: BeamTables, atlas: MapAtlas, rect: np.ndarray) -> None:
-        import moderngl
-
         ctx = self._ctx
         rows, per_row, texels, _ = beams.texels.shape
         values = PARAMETERS.zeros(1)

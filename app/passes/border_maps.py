@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
-if TYPE_CHECKING:
-    import moderngl
-
-    from .map_layout import MapLayout
+from .map_layout import MapLayout
 
 
 def border_rows(layout: MapLayout) -> np.ndarray:

@@ -8,17 +8,14 @@ border of a convex flat receiver, photons there stand for those beyond it too (`
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..gpu.scene_buffers import SceneBuffers
 from ..model.geometry.outline import convex_outline
+from ..model.scene import Scene
 from .landings import Landings
 from .plane_frame import PlaneFrame
-
-if TYPE_CHECKING:
-    from ..gpu.scene_buffers import SceneBuffers
-    from ..model.scene import Scene
 
 MOST_BORDERS = 256
 """Borders of a receiver at most, since every photon there is tested with all of them: an outline of more near which

@@ -9,20 +9,16 @@ ones (`shaders/lib/contact.glsl`). Away from such lines nothing is asked and not
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..gpu import shader
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.tiles import Tile
+from ..model.scene import Camera
+from .map_layout import MapLayout
 from .picture_window import PictureWindow
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.scene_buffers import SceneBuffers
-    from ..gpu.tiles import Tile
-    from ..model.scene import Camera
-    from .map_layout import MapLayout
 
 PARTS = 4
 """Parts of a texel along its side."""
@@ -104,8 +100,6 @@ class _Drawn:
 
     def run(self, window: PictureWindow, plane: np.ndarray, receiver: int, tile: Tile, words: moderngl.Texture) -> None:
         """Write the words of one window, a stripe of rows at a time."""
-        import moderngl
-
         ctx, width = self._ctx, tile.width * PARTS
         rows = max(1, _SAMPLES_AT_ONCE // (width * PARTS))
         self._program["plane"] = tuple(plane)

@@ -6,7 +6,7 @@ Nothing here changes light: exposure, tone curves, false colour and the error ma
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import moderngl
 import numpy as np
@@ -15,11 +15,9 @@ from ..base.colour_maps import ERROR, FALSE_COLOUR, glsl_table
 from ..edit.state import Compare
 from ..edit.state import Display as Settings
 from ..gpu import shader
+from ..gpu.context import Context
 from ..gpu.schema import Field, Struct
-
-if TYPE_CHECKING:
-    from ..gpu.context import Context
-    from .glare import Halo
+from .glare import Halo
 
 DISPLAY_PARAMETERS = Struct(
     "DisplayParameters",

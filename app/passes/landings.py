@@ -4,19 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..gpu import shader
+from ..gpu.scene_buffers import SceneBuffers
+from ..gpu.schema import Struct
+from ..model.scene import Camera
 from ..model.scene_camera import camera_frame
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.scene_buffers import SceneBuffers
-    from ..gpu.schema import Struct
-    from ..model.scene import Camera
 
 CHOSEN = 512
 """Photons that say where all of them land."""

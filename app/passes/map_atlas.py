@@ -6,19 +6,14 @@ photons: a float32 sum of a million small numbers loses digits that a sum of sum
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+import moderngl
 import numpy as np
 
 from ..gpu import shader
 from ..gpu.framebuffers import frame_of, park
 from ..gpu.records import NONE, PLACEMENT
+from ..gpu.tiles import Tile
 from .splat_sums import SplatSums
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.tiles import Tile
 
 KIND_FLAT, KIND_CHART, KIND_PICTURE = 0, 1, 2
 
@@ -91,8 +86,6 @@ class MapAtlas:
         self._framebuffer.clear()
 
     def _texture(self) -> moderngl.Texture:
-        import moderngl
-
         texture = self.ctx.texture(self.size, 4, dtype="f4")
         texture.filter = (moderngl.LINEAR, moderngl.LINEAR)
         texture.repeat_x = texture.repeat_y = False

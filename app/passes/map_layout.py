@@ -8,7 +8,6 @@ the plane. A curved receiver gets charts. All of them are tiles of one atlas.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +15,7 @@ from ..base.errors import UserError
 from ..gpu.records import NONE, PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.tiles import Tile, pack
+from ..model.geometry.charts import ChartAtlas
 from ..model.scene import Camera, Scene
 from ..model.scene_camera import camera_frame, camera_rays
 from .borders import lit_borders
@@ -23,9 +23,6 @@ from .landings import Landings, faces_camera, is_back, on_both
 from .map_atlas import placement_rows
 from .picture_window import PLENTY, PictureWindow, picture_window
 from .plane_frame import PlaneFrame, plane_frame
-
-if TYPE_CHECKING:
-    from ..model.geometry.charts import ChartAtlas
 
 MIN_TILE = 32
 _UNSEEN_TILE = 64

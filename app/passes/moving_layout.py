@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.scene import Scene
 from .borders import lit_borders
+from .landings import Landings
 from .map_layout import LEVEL_STEPS, MapLayout, Window, extent_of, grown, known_windows, meet
 from .plane_frame import PlaneFrame, plane_frame
-
-if TYPE_CHECKING:
-    from ..gpu.scene_buffers import SceneBuffers
-    from ..model.scene import Scene
-    from .landings import Landings
 
 ROOM = 0.25
 """Share of its size by which a new window is larger, on each side, than what it has to hold."""

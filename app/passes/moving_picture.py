@@ -9,7 +9,6 @@ neighbours on the same surface share what it found.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
@@ -17,13 +16,11 @@ import numpy as np
 from ..features.program_switches import switched
 from ..gpu import shader
 from ..gpu.schema import Field, Struct
+from ..model.scene import Camera
+from .camera import CameraPass
 from .camera_programs import direct_defines
+from .caustic_maps import CausticMaps
 from .first_surfaces import FirstSurfaces
-
-if TYPE_CHECKING:
-    from ..model.scene import Camera
-    from .camera import CameraPass
-    from .caustic_maps import CausticMaps
 
 MOVING_PARAMETERS = Struct(
     "MovingParameters",

@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.splat_way import way_of
+from ..gpu.tiles import Tile
+from ..model.geometry.charts import ChartAtlas
 from .light_programs import sum_defines
+from .map_atlas import MapAtlas
 from .splat_sums import BIND_SUMS, copy_texture
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.tiles import Tile
-    from ..model.geometry.charts import ChartAtlas
-    from .map_atlas import MapAtlas
 
 _SIDE, _WORKGROUP = 16, 64
 _ACROSS = 32768

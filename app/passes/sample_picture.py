@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+import moderngl
 import numpy as np
 
 from ..gpu import shader
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.context import Context
+from ..gpu.context import Context
 
 LATTICE = (160, 90)
 """Pixels read across and down."""

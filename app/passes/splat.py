@@ -9,15 +9,17 @@ sums is the photons' own. A GPU takes all of a pass at once, in any order.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
+from ..features.features import Features
 from ..features.program_switches import Defines, switched
 from ..gpu import shader
 from ..gpu.context import check_device
 from ..gpu.framebuffers import adding
 from ..gpu.schema import Field, Struct
+from ..gpu.splat_tables import SplatTables
 from ..gpu.splat_way import way_of
 from .footprint import (
     KIND_WORDS,
@@ -32,14 +34,8 @@ from .footprint import (
     slots_per_photon,
 )
 from .light_programs import draw_variants, sum_defines
+from .map_atlas import MapAtlas
 from .splat_sums import BIND_SUMS
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..features.features import Features
-    from ..gpu.splat_tables import SplatTables
-    from .map_atlas import MapAtlas
 
 GROUP, BULK_GROUP = 1 << 15, 1 << 22
 """Photons that are turned into splats and drawn at a time; on GPUs, each group of which costs the time of its
@@ -166,8 +162,6 @@ class Splatter:
             program.run_indirect(commands, 4 * KIND_WORDS * (kind - 1))
 
     def _draw(self, atlas: MapAtlas) -> None:
-        import moderngl
-
         atlas.framebuffer.use()
         # A kind that no splat of the group is of has no vertices.
         with adding(self._ctx):

@@ -4,15 +4,13 @@ them to where a device's rasteriser blends slowly."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+
+import moderngl
 
 from ..gpu import shader
 from ..gpu.framebuffers import frame_of
 from ..gpu.splat_way import sums_bytes, way_of
 from .light_programs import sum_defines
-
-if TYPE_CHECKING:
-    import moderngl
 
 BIND_SUMS = 2
 ROWS = 16

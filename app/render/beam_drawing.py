@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
+from ..beams.polygons import BeamPolygons
 from ..gpu import shader
 from ..gpu.beam_tables import BeamTables
+from ..gpu.context import Context
 from ..gpu.map_channels import MapChannels
+from ..gpu.scene_buffers import SceneBuffers
 from ..passes.beam_splat import BeamSplatter
-
-if TYPE_CHECKING:
-    from ..beams.polygons import BeamPolygons
-    from ..gpu.context import Context
-    from ..gpu.scene_buffers import SceneBuffers
-    from ..passes.plane_frame import PlaneFrame
-    from .light_maps import LightMaps
-    from .shown_spectra import ShownSpectra
+from ..passes.plane_frame import PlaneFrame
+from .light_maps import LightMaps
+from .shown_spectra import ShownSpectra
 
 
 class BeamDrawing:

@@ -5,27 +5,23 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..base.memory import available_bytes
+from ..features.features import Features
+from ..gpu.context import Context
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.lattice_slice import Parts, every, points_of
+from ..passes.map_atlas import MapAtlas
 from ..passes.trace import SPLIT_THRESHOLD, Batch, Sent, TracePass, queue_class
+from .light_maps import LightMaps
 from .light_plan import SMALLEST_BATCH, LightPlan
+from .light_stats import LightStats
 from .photon_records import PhotonRecords, RoundOf
+from .shown_spectra import ShownSpectra, ShownTables
 from .splatting import Splatting
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..features.features import Features
-    from ..gpu.context import Context
-    from ..passes.map_atlas import MapAtlas
-    from .light_maps import LightMaps
-    from .light_stats import LightStats
-    from .shown_spectra import ShownSpectra, ShownTables
 
 MIN_RAYS = 1 << 10
 """Rays of a batch that are not divided further, however slow the device is."""

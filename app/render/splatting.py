@@ -5,21 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
+
+import moderngl
 
 from ..gpu import shader
+from ..gpu.context import Context
 from ..gpu.dispatch_budget import DISPATCH_S, DispatchBudget
 from ..passes.footprint import Photons, SplatSpectra
+from ..passes.map_atlas import MapAtlas
 from ..passes.splat import CHUNK, FLUSH_SHARE
 from ..passes.splat_sums import ROWS, Accumulate
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.context import Context
-    from ..passes.map_atlas import MapAtlas
-    from .light_maps import LightMaps
-    from .shown_spectra import ShownSpectra, ShownTables
+from .light_maps import LightMaps
+from .shown_spectra import ShownSpectra, ShownTables
 
 FLUSH_AHEAD = 0.9
 """Share of the photons after which a splat pass sums its maps up by itself."""

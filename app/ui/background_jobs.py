@@ -5,24 +5,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
-from ..gpu.context_thread import no_thread
+from ..edit import requests
+from ..edit.state import State
+from ..gpu.context import Context
+from ..gpu.context_thread import ContextThread, no_thread
 from ..render.viewer.rehearsal import Rehearsals
 from .compare import Comparison, engine_beside
 from .cursor_info import Cursor
 from .export import Exports, Shown
 from .gallery import Gallery, best_first
+from .live_picture import LivePicture
 from .ray_overlay import RayOverlay
-
-if TYPE_CHECKING:
-    from ..edit import requests
-    from ..edit.state import State
-    from ..gpu.context import Context
-    from ..gpu.context_thread import ContextThread
-    from .live_picture import LivePicture
 
 JOB_SHARE = 0.6
 """Share of a frame's budget that a running export gets."""

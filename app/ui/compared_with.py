@@ -4,21 +4,17 @@ file."""
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..base.errors import UserError
 from ..base.image_io import read_image
 from ..edit.glass import set_dispersion
+from ..edit.state import Selection
+from ..gpu.context import Context
 from ..model.optics import catalogue
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..edit.state import Selection
-    from ..gpu.context import Context
-    from ..model.scene import Scene
+from ..model.scene import Scene
 
 
 class GlassSwap:

@@ -6,12 +6,15 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..gpu.context_thread import SteppedWork
+from ..edit.live_inputs import LiveInputs
+from ..gpu.context import Context
+from ..gpu.context_thread import ContextThread, SteppedWork
 from ..gpu.map_channels import MapChannels
+from ..gpu.scene_buffers import SceneBuffers
+from ..model.scene import Scene
 from ..model.settings import RenderSettings
 from ..passes.camera import CameraPass
 from ..passes.caustic_maps import CausticMaps
@@ -20,13 +23,6 @@ from ..passes.gathered_light import FIRST_DIRECTIONS
 from ..passes.spectrum_choice import Spectrum
 from ..render.device_scene import scene_buffers
 from ..render.shown_spectra import reflectance_classes
-
-if TYPE_CHECKING:
-    from ..edit.live_inputs import LiveInputs
-    from ..gpu.context import Context
-    from ..gpu.context_thread import ContextThread
-    from ..gpu.scene_buffers import SceneBuffers
-    from ..model.scene import Scene
 
 SAMPLES = (1, 4, 16, 32)
 """At which it is shown anew: something at once, and it becomes finer."""

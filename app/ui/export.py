@@ -6,7 +6,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +18,8 @@ from ..edit import requests
 from ..edit.parameters import Stage
 from ..edit.state import Display as DisplaySettings
 from ..edit.state import State
-from ..gpu.context_thread import no_thread
+from ..gpu.context import Context
+from ..gpu.context_thread import ContextThread, no_thread
 from ..model.scene import RenderDefaults
 from ..model.settings import RenderSettings
 from ..passes.display import Display
@@ -30,10 +30,6 @@ from .file_writer import FileWriter
 from .screenshot import Shown, screenshot, texture_codes, write_codes
 from .solving_jobs import FoundPictures, solving_job
 from .view_model import JobInfo
-
-if TYPE_CHECKING:
-    from ..gpu.context import Context
-    from ..gpu.context_thread import ContextThread
 
 _CAUSTIC_SHARE = 0.2
 """Share of the time for the layer of the caustics alone: light is traced once, and their camera samples are cheap."""

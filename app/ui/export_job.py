@@ -7,18 +7,15 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..base.errors import UserError
 from ..base.memory import MAX_SIDE_PX
-from ..gpu.context_thread import SteppedWork
+from ..edit.state import State
+from ..gpu.context_thread import ContextThread, SteppedWork
 from ..model.settings import RenderSettings
 from ..render.notices import FrameNotices
 from .view_model import JobInfo
-
-if TYPE_CHECKING:
-    from ..edit.state import State
-    from ..gpu.context_thread import ContextThread
 
 
 @dataclass

@@ -6,16 +6,13 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+
+import moderngl
 
 from ..base import files
 from ..base.paths import assets_dir
+from ..gpu.context import Context
 from .view_model import SceneEntry
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.context import Context
 
 SIZE = (640, 360)
 """Largest of a picture on the page, pixels."""

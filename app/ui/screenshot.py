@@ -5,19 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ..base.atomic import atomic_output
 from ..base.errors import UserError
 from ..base.image_io import SHOWN_SUFFIXES, check_finite, check_suffix, save_codes, write_image
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ..gpu.context import Context
-    from ..model.scene import Vec3
+from ..gpu.context import Context
+from ..model.scene import Vec3
 
 
 @dataclass(frozen=True)

@@ -8,33 +8,29 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import moderngl
 import numpy as np
 
 from ...base.errors import UserError
+from ...beams.polygons import BeamPolygons
+from ...gpu.context import Context
 from ...gpu.packed_records import read_records
 from ...gpu.records import EDGE_BIT, LATTICE_BIT, photon_record_of
+from ...gpu.schema import Struct
 from ...gpu.spectral_groups import samples_of
 from ...model.optics.colorimetry import VISIBLE_NM
+from ...model.scene import Scene
+from ...model.settings import RenderSettings
 from ...passes.map_layout import LIVE
 from ...passes.plane_frame import PlaneFrame, plane_frame
+from ...passes.trace import Batch
 from ..device_scene import scene_buffers
 from ..light_pass import LightPass
 from ..map_fit import MapFit
-from ..photon_records import NoRecords
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ...beams.polygons import BeamPolygons
-    from ...gpu.context import Context
-    from ...gpu.schema import Struct
-    from ...model.scene import Scene
-    from ...model.settings import RenderSettings
-    from ...passes.trace import Batch
-    from ..photon_records import RoundOf
-    from .spectra import Glasses
+from ..photon_records import NoRecords, RoundOf
+from .spectra import Glasses
 
 _LIT = 0.8
 """Share along either axis of what views from above and all round begin with."""

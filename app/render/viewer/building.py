@@ -7,8 +7,11 @@ import time
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import TYPE_CHECKING
 
+from ...edit.live_inputs import LiveInputs
+from ...gpu.context import Context
+from ...gpu.device_traits import Budget
+from ...gpu.scene_buffers import SceneBuffers
 from ...gpu.shader import compiled_by
 from ...model.settings import RenderSettings
 from ..device_scene import scene_buffers
@@ -16,13 +19,6 @@ from ..map_fit import preview_size
 from ..sampling import MovingBeams
 from .accumulation import Accumulation
 from .live_light import LiveLight
-
-if TYPE_CHECKING:
-    from ...edit.live_inputs import LiveInputs
-    from ...gpu.context import Context
-    from ...gpu.device_traits import Budget
-    from ...gpu.scene_buffers import SceneBuffers
-
 
 _ENVIRONMENT_S = 0.006
 """Seconds that one dispatch for the environment's light should take."""

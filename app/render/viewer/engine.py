@@ -12,13 +12,14 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
+from ...gpu.context import Context
+from ...gpu.device_traits import Budget
 from ...model.panorama_lights import with_panorama_lights
 from ...passes.caustic_maps import CausticMaps
 from ..light_maps import LightMaps
@@ -36,10 +37,6 @@ from .live_light import LiveLight
 from .refit import needs_new_maps
 from .schedule import Action, Happened, ShowMaps
 from .stats import light_counts
-
-if TYPE_CHECKING:
-    from ...gpu.context import Context
-    from ...gpu.device_traits import Budget
 
 PREVIEW_OVERRUN_S = 0.25
 """What a coarse picture may take beyond a frame's budget."""

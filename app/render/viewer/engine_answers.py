@@ -6,27 +6,25 @@ Nothing here works or changes anything: `LiveEngine` does, which keeps the field
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
+
+import moderngl
+import numpy as np
 
 from ...base.not_yet import NOT_YET, NotYet
+from ...edit.live_inputs import LiveInputs
 from ...edit.stored_photons import StoredPhotons
+from ...gpu.context import Context
 from ..notices import shares
 from .building import Building, Shown
 from .dirty_level import DirtyLevel
 from .invalidation import dirty_level
 from .live_camera import LiveCamera
+from .live_light import LiveLight
 from .photon_queries import QUERIED_PHOTONS, CausticSpectrum, spectrum_at, world_photons
 from .refit import is_judged
 from .schedule import CameraState, Schedule
 from .stats import LiveStats, WorkTally
-
-if TYPE_CHECKING:
-    import moderngl
-    import numpy as np
-
-    from ...edit.live_inputs import LiveInputs
-    from ...gpu.context import Context
-    from .live_light import LiveLight
 
 
 class EngineAnswers:

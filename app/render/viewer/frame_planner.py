@@ -5,13 +5,11 @@ from __future__ import annotations
 import time
 from collections import deque
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
+from ...gpu.context import Context
 from ...gpu.pass_timers import FrameTimes
 from .frame_plan import FEWEST, FramePlan, Spent
-
-if TYPE_CHECKING:
-    from ...gpu.context import Context
 
 Kind = Literal["stored", "moved", "refining"]
 """What a frame's photons are for: stored ones shown otherwise, new ones through what is moved, or more of the same."""

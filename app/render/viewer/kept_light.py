@@ -9,19 +9,16 @@ from __future__ import annotations
 
 from copy import deepcopy
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
+import moderngl
+
+from ...edit.live_inputs import LiveInputs
 from ...gpu import shader
+from ..light_maps import LightMaps
+from ..light_pass import LightPass
+from ..light_stats import LightStats
 from .dirty_level import DirtyLevel
 from .invalidation import dirty_level
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ...edit.live_inputs import LiveInputs
-    from ..light_maps import LightMaps
-    from ..light_pass import LightPass
-    from ..light_stats import LightStats
 
 
 @dataclass

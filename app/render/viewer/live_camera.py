@@ -15,13 +15,16 @@ import copy
 import time
 from collections.abc import Iterator
 from functools import partial
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ...gpu import shader
+from ...gpu.context import Context
 from ...gpu.map_channels import MapChannels
+from ...gpu.scene_buffers import SceneBuffers
 from ...gpu.texture_store import TextureStore
+from ...model.scene import Camera, Scene
 from ...passes.camera import MAX_TAPS, CameraPass
 from ...passes.caustic_maps import CausticMaps
 from ...passes.first_surfaces import FirstSurfaces
@@ -30,13 +33,6 @@ from ...passes.spectrum_choice import Spectrum
 from ..sampling import CameraSampling, whole_cycles
 from .glass_steps import GlassSteps, blended
 from .schedule import CameraState
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ...gpu.context import Context
-    from ...gpu.scene_buffers import SceneBuffers
-    from ...model.scene import Camera, Scene
 
 SCALES = (1.0, 0.5, 1 / 3, 0.25)
 """Sides of a picture in motion over the side wanted: less than 1 only where what is seen directly takes a device

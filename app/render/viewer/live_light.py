@@ -6,14 +6,19 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...base.generators import mapped
+from ...edit.live_inputs import LiveInputs
 from ...features.features import Features
 from ...gpu import shader
+from ...gpu.context import Context
+from ...gpu.scene_buffers import SceneBuffers
+from ...model.scene import Scene
+from ...model.settings import RenderSettings
 from ...passes.bounce_light import BounceLightPass
+from ...passes.caustic_maps import CausticMaps
 from ...passes.environment_light import EnvironmentLightPass
 from ...passes.map_layout import LIVE
 from ..device_scene import scene_buffers
@@ -25,6 +30,7 @@ from ..photon_batches import traced_besides
 from ..sampling import MovingBeams
 from ..shown_spectra import PassTables
 from ..solo import solo, solo_scene
+from .frame_plan import FramePlan
 from .invalidation import shown_glasses
 from .kept_light import KeptLight
 from .moved_light import MovedLight
@@ -32,15 +38,6 @@ from .photon_store import PhotonStore
 from .spectrum_guess import SpectrumGuess
 from .stored_passes import StoredPass, StoredPasses
 from .widening import needs_widening, widening
-
-if TYPE_CHECKING:
-    from ...edit.live_inputs import LiveInputs
-    from ...gpu.context import Context
-    from ...gpu.scene_buffers import SceneBuffers
-    from ...model.scene import Scene
-    from ...model.settings import RenderSettings
-    from ...passes.caustic_maps import CausticMaps
-    from .frame_plan import FramePlan
 
 BEAM_SECONDS = 0.03
 """What finding and drawing beams should take while something is dragged."""

@@ -8,32 +8,28 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ...base.generators import finished
+from ...features.features import Features
 from ...gpu import shader
+from ...gpu.context import Context
 from ...model.geometry.mesh import Mesh
 from ...model.scene import Scene
 from ...passes.emission_domain import EmissionDomain, emission_domain
 from ...passes.footprint import Photons, SplatSpectra
 from ...passes.landings import ChosenLandings
 from ...passes.lattice_slice import every
+from ...passes.map_layout import MapLayout
 from ...passes.moving_layout import followed
+from ...passes.trace import Batch, Sent
 from ..light_maps import LightMaps
+from ..light_pass import LightPass
+from ..light_plan import LightPlan
 from ..shown_spectra import PassTables
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ...features.features import Features
-    from ...gpu.context import Context
-    from ...passes.map_layout import MapLayout
-    from ...passes.trace import Batch, Sent
-    from ..light_pass import LightPass
-    from ..light_plan import LightPlan
-    from .frame_plan import FramePlan
+from .frame_plan import FramePlan
 
 SECONDS = 0.05
 """What tracing and splatting should take where the processor draws."""

@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...edit.live_inputs import LiveInputs
 from ...edit.stored_photons import StoredPhotons
+from ...model.optics.spectrum import Spectrum
 from ...passes.landings import faces_camera
 from .invalidation import shown_glasses
-
-if TYPE_CHECKING:
-    from ...edit.live_inputs import LiveInputs
-    from ...model.optics.spectrum import Spectrum
-    from .live_light import LiveLight
+from .live_light import LiveLight
 
 NO_OBJECT = 0xFFFF
 QUERIED_PHOTONS = 200_000

@@ -7,17 +7,13 @@ are the same picture, only coarser. A preview shows those while a slider is drag
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ...gpu.packed_records import read_records
+from ...gpu.schema import Struct
 from ..photon_records import RoundOf
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ...gpu.schema import Struct
 
 
 @dataclass(frozen=True)

@@ -6,15 +6,11 @@ window that only the coarse one holds."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from ...edit.live_inputs import LiveInputs
 from ...passes.map_layout import MapLayout, Window
-
-if TYPE_CHECKING:
-    from ...edit.live_inputs import LiveInputs
-    from .live_light import LiveLight
+from .live_light import LiveLight
 
 PAYS = 1.5
 """Texels must get so many times smaller."""

@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Hashable, Iterator
 from concurrent.futures import Future
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,13 +14,11 @@ from ...edit.glass import set_dispersion_gain
 from ...edit.live_inputs import LiveInputs
 from ...edit.objects import add_dabs, set_transform
 from ...features.features import Features
+from ...gpu.context import Context
+from ...gpu.context_thread import ContextThread
 from ...model.scene import Dab, Scene
 from ...model.settings import RenderSettings
 from .engine import LiveEngine
-
-if TYPE_CHECKING:
-    from ...gpu.context import Context
-    from ...gpu.context_thread import ContextThread
 
 PHOTONS, WIDTH, HEIGHT = 1 << 12, 97, 55
 STEP_S = 0.5

@@ -8,16 +8,13 @@ maps hold.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+import moderngl
 import numpy as np
 
 from ...gpu import shader
 from ...gpu.map_channels import MapChannels
 from ...model.scene import Light
-
-if TYPE_CHECKING:
-    import moderngl
 
 _GROUP = 8
 _EVEN = 1e-4

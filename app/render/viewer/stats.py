@@ -5,10 +5,9 @@ from __future__ import annotations
 import time
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-if TYPE_CHECKING:
-    from ..light_stats import LightStats
+from ..light_stats import LightStats
 
 _HISTORY_S = 1.0
 

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+
+import moderngl
 
 from ...gpu import shader
-from ..shown_spectra import PassTables
+from ...gpu.reindex import Spans
+from ...passes.trace import Batch
+from ..photon_records import RoundOf
+from ..shown_spectra import PassTables, ShownSpectra
 from .photon_store import PhotonStore
-
-if TYPE_CHECKING:
-    import moderngl
-
-    from ...gpu.reindex import Spans
-    from ...passes.trace import Batch
-    from ..photon_records import RoundOf
-    from ..shown_spectra import ShownSpectra
 
 
 @dataclass
