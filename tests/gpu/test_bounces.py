@@ -152,6 +152,7 @@ def test_in_a_furnace_everything_gets_the_same(gl: Context, material) -> None:
     assert abs(light[inside] / math.pi - 1.0).max() < 0.2
 
 
+@pytest.mark.slow
 def test_a_ball_that_stands_on_the_floor_changes_little_when_it_is_raised(gl: Context) -> None:
     """A curved solid in contact has rules of its own for what rays cross there."""
 

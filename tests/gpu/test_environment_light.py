@@ -140,6 +140,7 @@ def test_a_white_thing_vanishes_in_a_white_furnace(gl: Context) -> None:
     np.testing.assert_allclose(shown, 1.0, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_turning_everything_changes_nothing(gl: Context) -> None:
     angle = math.radians(50.0)
     turn = np.eye(4)

@@ -75,7 +75,7 @@ def loaded(tmp_path: Path) -> Scene:
     return load(tmp_path, BALL)
 
 
-@pytest.mark.parametrize("path", ["objects.ball.n_d", "objects.ball.position.x"])
+@pytest.mark.parametrize("path", ["objects.ball.n_d", pytest.param("objects.ball.position.x", marks=pytest.mark.slow)])
 def test_of_a_ball(gl, tmp_path: Path, path: str) -> None:
     """Within 4 % of the norm by 40,000 photons, most of which is chance of both."""
     scene = loaded(tmp_path)

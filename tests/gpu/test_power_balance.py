@@ -19,9 +19,6 @@ from spectrasplat.model.settings import RenderSettings
 from spectrasplat.passes import pilot
 from spectrasplat.render.still import render
 
-SCENES = ("prism", "brilliant")
-"""Both reflect totally inside; the brilliant cuts bands where that sets in."""
-
 
 @dataclass(frozen=True)
 class Balance:
@@ -52,8 +49,9 @@ def balance(
     )
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@pytest.mark.parametrize("scene", [pytest.param("prism", marks=pytest.mark.slow), "brilliant"])
 def test_all_that_was_emitted_is_drawn_or_accounted_for_where_reflection_is_total(gl, scene: str) -> None:
+    """Both reflect totally inside; the brilliant cuts bands where that sets in."""
     found = balance(gl, scene, photons=20_000)
     assert found.unaccounted < 1e-4
     assert abs(found.drawn) < 1e-4

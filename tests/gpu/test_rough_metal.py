@@ -103,7 +103,7 @@ def test_a_rough_plate_of_gold_throws_what_the_reference_does(gl: Context) -> No
     assert error(caustic(gl, lit(0.4), 40_000).rgb, reference) > 0.2
 
 
-@pytest.mark.parametrize("polarised", [False, True])
+@pytest.mark.parametrize("polarised", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_brushed_metals_as_the_reference_sees_them(gl: Context, polarised: bool) -> None:
     """Gold, copper under a film and a white ball before a sky that changes in every direction."""
     camera = Camera((0.2, -0.3, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), vertical_fov_deg=22.0)

@@ -124,7 +124,7 @@ def test_films_in_a_furnace(gl: Context, films: tuple[Material, ...], polarised:
         assert seen == pytest.approx(expected, rel=5e-3), (film, degrees)
 
 
-@pytest.mark.parametrize("polarised", [False, True])
+@pytest.mark.parametrize("polarised", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_films_as_the_reference_sees_them(gl: Context, polarised: bool) -> None:
     """A soap film, a coated prism and gold before a sky that changes in every direction."""
     camera = Camera((0.2, -0.3, 4.0), (0.0, 0.0, 0.0), (0.0, 1.0, 0.0), vertical_fov_deg=22.0)

@@ -96,7 +96,7 @@ def test_sheets_in_a_furnace(gl: Context) -> None:
         assert seen == pytest.approx(daylight_mean(both + passed), rel=2e-3), (material, degrees)
 
 
-@pytest.mark.parametrize("polarised", [False, True])
+@pytest.mark.parametrize("polarised", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_sheets_as_the_reference_sees_them(gl: Context, polarised: bool) -> None:
     """Two tilted sheets and a tinted prism of a solid before a sky that changes in every direction."""
     first, second = (

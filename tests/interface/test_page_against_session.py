@@ -76,6 +76,7 @@ def check(found: dict[str, tuple[float, float]]) -> None:
     assert {shown: pair for shown, pair in found.items() if pair[0] > OWN + pair[1]} == {}
 
 
+@pytest.mark.slow
 def test_photons_are_as_a_sessions(browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A ball's caustic is broad: pixels of a session that are half as wide will do."""
     monkeypatch.setattr(page_pixels_module, "FINER", 2)

@@ -46,7 +46,7 @@ def swept_and_summed(text: str, places: np.ndarray = PLACES, side: int = 60, thr
     return one, other, total, total_summed, sums
 
 
-LONG = "step cut", "amici"
+LONG = "step cut", "amici", "two stones"
 """By 400 indices alone: of 40, one that lies where a beam begins counts a fortieth of its light (1.08e-3)."""
 
 

@@ -287,6 +287,7 @@ def test_a_kernel_that_shrinks_takes_its_bias_along(gl, reference: tuple[np.ndar
     assert bias2[False] > 0.0 and bias2[True] < 0.5 * bias2[False], bias2
 
 
+@pytest.mark.slow
 def test_passes_that_grow_take_their_bias_along(gl) -> None:
     """With kernels that blur, bias² of `progressive` by photons falls with every pass, as its footprints become half as
     wide; that of a mutant whose footprints stay as wide hardly falls."""

@@ -227,6 +227,7 @@ def test_spectra_through_ground_flint(gl: Context, method: str, polarisation: bo
     assert error(found, reference) < 0.05
 
 
+@pytest.mark.slow
 def test_hardly_rough_is_polished(gl: Context) -> None:
     """A ten-thousandth of a radian is nothing to see, and the lattice's footprints serve."""
     rough, polished = (caustic(gl, prism(roughness), 10_000, method="srd-photons").rgb for roughness in (0.01, 0.0))

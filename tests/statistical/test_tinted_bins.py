@@ -37,7 +37,7 @@ def test_a_dim_bin_holds_its_own_light(gl, monkeypatch: pytest.MonkeyPatch) -> N
     assert off.max() > 1.5 * TOLERANCE, "bands for the whole light would do"
 
 
-@pytest.mark.parametrize("bins", [None, BINS])
+@pytest.mark.parametrize("bins", [pytest.param(None, marks=pytest.mark.slow), BINS])
 def test_what_beams_leave_has_the_photons_bands(gl, bins: int | None) -> None:
     """A tinted pane that disperses nothing under a lamp without violet and deep red: photons' bands began where the
     lamp does and beams' at the end of the axis, and what beams left had no table."""

@@ -85,6 +85,7 @@ def test_a_plate_is_checked_against_its_target(tmp_path: Path, shaped: str) -> N
         assert dict(mirrored.rows())["tolerance"].startswith("not measured")
 
 
+@pytest.mark.slow
 def test_how_a_blurred_picture_is_turned_is_not_said() -> None:
     """Far from its focus other turns are as like."""
     made = plate(DISTANCE, PMMA.n_d, resolution=61)

@@ -137,6 +137,7 @@ def test_light_and_its_spread_are_those_of_a_walk_with_two_colours() -> None:
     assert sums[:, gem_paths.SPREAD].sum() == pytest.approx(own[:, 1].sum(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_round_stone_s_curves_are_even() -> None:
     found = gem_report(stone_of(brilliant(), DIAMOND), cancelled=None)
     assert found is not None
