@@ -285,6 +285,8 @@ def _read_exr(path: Path, layer: str) -> Picture:
 
 def _read_npy(path: Path, layer: str) -> Picture:
     rgb = files.read_npy(path)
+    if rgb.dtype.kind != "f":
+        raise ValueError(f"it holds whole numbers ({rgb.dtype}): codes of a picture are a .png, light is float32")
     if rgb.ndim != 3 or rgb.shape[2] != 3:
         raise ValueError(f"its shape is {rgb.shape}, not (H, W, 3)")
     _check_pixels(rgb.shape[1], rgb.shape[0])

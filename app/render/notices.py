@@ -136,7 +136,9 @@ def picture_notices(light: LightPass, camera: Camera, settings: RenderSettings, 
     pixels, where nothing may be in the way."""
     if settings.bins or settings.layer not in ("beauty", "caustic") or not np.isfinite(rgb).all():
         return []
-    if settings.layer == "caustic" and light.stats.tally.ended["deposited"] > 0.0 and not rgb.any():
+    if light.stats.tally.ended["deposited"] > 0.0 and not rgb.any():
+        if settings.layer == "beauty":
+            return ["the picture is black: the camera sees nothing that is lit; see whether something hides it"]
         seen = "the camera sees what caustics fall on through glass or in mirrors, or not at all"
         return [f"the picture is black: {seen}; the layer 'beauty' shows what it sees"]
     expected, held = 0.0, 0.0

@@ -83,6 +83,8 @@ def test_a_picture_that_lacks_what_its_maps_hold_is_told(gl) -> None:
         assert "30 %" in told
         (told,) = picture_notices(light, scene.camera, SETTINGS, 0.0 * right)
         assert "black" in told
+        (told,) = picture_notices(light, scene.camera, replace(SETTINGS, layer="beauty"), 0.0 * right)
+        assert "nothing that is lit" in told
         assert light_notices(light) == []
 
 

@@ -58,9 +58,21 @@ UP = np.arange(0, 181, 10.0)
         *(ies_text(shape, UP, np.arange(low, high, 15.0)) for low, high in ((0, 91), (0, 181), (0, 361), (90, 271))),
         ies_text(shape, UP, np.arange(0, 346, 15.0)),  # 360 is 0
         *(ldt_text(shape, UP, 24, symmetry) for symmetry in (0, 2, 3, 4)),
-        ldt_text(shape, UP, 24, 0).replace(".", ","),
+        *(text.replace(".", ",") for text in (ldt_text(shape, UP, 24, 0), ies_text(shape, UP, np.arange(0, 91, 15.0)))),
     ],
-    ids=["0-90", "0-180", "0-360", "90-270", "0-345", "ldt 0", "ldt 2", "ldt 3", "ldt 4", "ldt, decimal commas"],
+    ids=[
+        "0-90",
+        "0-180",
+        "0-360",
+        "90-270",
+        "0-345",
+        "ldt 0",
+        "ldt 2",
+        "ldt 3",
+        "ldt 4",
+        "ldt, decimal commas",
+        "decimal commas",
+    ],
 )
 def test_all_symmetries_are_the_same_lamp(tmp_path: Path, text: str) -> None:
     profile = read(tmp_path, text)

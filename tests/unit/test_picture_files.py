@@ -307,6 +307,8 @@ def test_missing_empty_and_unknown_files_are_refused(tmp_path: Path) -> None:
         assert "No such file" in refusal(tmp_path / f"gone{suffix}")
     np.save(tmp_path / "empty.npy", np.zeros((0, 4, 3), np.float32))
     assert "the picture is empty (4 × 0 pixels)" in refusal(tmp_path / "empty.npy")
+    np.save(tmp_path / "codes.npy", np.zeros((2, 4, 3), np.uint8))
+    assert "it holds whole numbers (uint8)" in refusal(tmp_path / "codes.npy")
     for suffix in (".exr", ".npy"):
         assert "it is not a whole" in refusal(write(tmp_path / f"bad{suffix}", b""))
         assert "it is not a whole" in refusal(write(tmp_path / f"bad{suffix}", b"nothing of the kind"))

@@ -211,7 +211,10 @@ class _Lm63(_Numbers):
             problem = "has no line TILT=, so it is no LM-63 file or is cut off" if text.strip() else "is empty"
             raise self._error(problem)
         self._tilt = lines[at].partition("=")[2].strip().upper()
-        self._words = " ".join(lines[at + 1 :]).replace(",", " ").split()
+        words = " ".join(lines[at + 1 :]).split()
+        # Commas part numbers, but where each stands within one of its own and no point does: then they are decimal.
+        is_decimal = all(re.fullmatch(r"[-+\d]+(,\d+)?", word) for word in words)
+        self._words = " ".join(words).replace(",", "." if is_decimal else " ").split()
 
     def profile(self) -> Profile:
         """All of the file."""
