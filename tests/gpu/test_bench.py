@@ -95,20 +95,8 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     )
     monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
-    arguments = [
-        "bench",
-        "prism",
-        "-o",
-        str(out),
-        "--seconds",
-        "0.2",
-        "--seeds",
-        "2",
-        "--methods",
-        "stochastic,srd",
-        "--size",
-        f"{WIDTH}x{HEIGHT}",
-    ]
+    options = f"--seconds 0.2 --seeds 2 --methods stochastic,srd --size {WIDTH}x{HEIGHT}"
+    arguments = ["bench", "prism", "-o", str(out), *options.split()]
     assert main([*arguments, "--reference-seconds", "0.3"]) == 0
     shown = capsys.readouterr().out
     result = msgspec.json.decode((out / "results.json").read_bytes(), type=BenchResult)

@@ -48,21 +48,8 @@ def test_a_tiny_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pyt
     monkeypatch.setattr(subjects, "caustic_plan", lambda _: CausticPlan(1 << 16))
     monkeypatch.setattr("spectrasplat.bench.machine.program_hash", lambda: "as it is")  # an editor may be at work
     out = tmp_path / "out"
-    arguments = [
-        "bench",
-        "--eye",
-        "prism_edge",
-        "-o",
-        str(out),
-        "--seconds",
-        "0.4",
-        "--seeds",
-        "2",
-        "--methods",
-        "stochastic,srd",
-        "--size",
-        f"{WIDTH}x{HEIGHT}",
-    ]
+    options = f"--seconds 0.4 --seeds 2 --methods stochastic,srd --size {WIDTH}x{HEIGHT}"
+    arguments = ["bench", "--eye", "prism_edge", "-o", str(out), *options.split()]
     assert main([*arguments, "--reference-seconds", "1"]) == 0
     shown = capsys.readouterr().out
     result = msgspec.json.decode((out / "results.json").read_bytes(), type=BenchResult)
