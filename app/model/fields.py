@@ -118,7 +118,9 @@ class Number(Field):
 
     @property
     def range_words(self) -> str:
-        """The bounds, as in "more than 0 and at most 1"."""
+        """The bounds, as in "between 0 and 1" or "more than 0 and at most 1"."""
+        if self.at_least is not None and self.at_most is not None:
+            return f"between {self.at_least:.7g} and {self.at_most:.7g}"
         bounds = {"more than": self.above, "at least": self.at_least, "less than": self.below, "at most": self.at_most}
         return " and ".join(f"{words} {bound:.7g}" for words, bound in bounds.items() if bound is not None)
 
