@@ -19,12 +19,11 @@ from .better_device import advice
 from .device_traits import DeviceTraits, is_software_renderer
 from .limits import Limits
 from .linker import adopting_context
+from .pass_timers import PassTimers
 from .splat_way import SplatWay, way_of
 
 if TYPE_CHECKING:
     import moderngl
-
-    from .pass_timers import PassTimers
 
 Backend = Literal["egl", "osmesa", "window"]
 """How a context was made; a window brings its own."""
@@ -89,7 +88,6 @@ class Context:
     @cached_property
     def timers(self) -> PassTimers:
         """What the device itself took for each pass."""
-        from .pass_timers import PassTimers
 
         return PassTimers(self.ctx, not self.is_software, is_software_renderer(self.renderer))
 

@@ -17,6 +17,7 @@ from ..gpu import shader
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.tiles import Tile
 from ..model.scene import Camera
+from ..model.scene_camera import camera_frame
 from .map_layout import MapLayout
 from .picture_window import PictureWindow
 
@@ -76,8 +77,6 @@ class _Drawn:
     """Owns the scene's corners and the programs."""
 
     def __init__(self, ctx: moderngl.Context, scene: SceneBuffers, camera: Camera) -> None:
-        from ..model.scene_camera import camera_frame
-
         self._ctx = ctx
         self._program = shader.program(ctx, "light/contact.vert", "light/contact.frag")
         self._pack = shader.compute(ctx, "light/contact.comp")

@@ -24,6 +24,7 @@ from .camera_records import CAMERA_PARAMETERS, camera_parameters
 from .first_surfaces import FirstSurfaces
 from .flights import MOST_EVENTS, PHOTONS, Flights, trace_flights
 from .picture_channels import Channels
+from .picture_sums import PictureSums
 
 _BIND_FLIGHTS, _BIND_HAZE_COLOURS, _BIND_HAZE = 8, 9, 10
 """The last is of uniform blocks."""
@@ -52,27 +53,16 @@ HAZE_PARAMETERS = Struct(
 )
 
 
-class AddedPicture:
-    """Owns RGBA32F textures of one size, four channels each, and the program that adds them to others."""
+class AddedPicture(PictureSums):
+    """A picture that is drawn once for a view and added to the camera's sums with every sample."""
 
     def __init__(self, ctx: moderngl.Context, targets: int) -> None:
         """`targets`: textures, made when a size is known."""
-        self._ctx = ctx
-        self._targets = targets
+        super().__init__(ctx, targets)
         self._program = shader.program(
             ctx, "camera/add_picture.vert", "camera/add_picture.frag", {"TARGETS": targets}, ()
         )
         self._triangle = ctx.vertex_array(self._program, [])
-        self.textures: list[moderngl.Texture] = []
-
-    def clear(self, size: tuple[int, int]) -> None:
-        """Black, in this size."""
-        if not self.textures or self.textures[0].size != size:
-            self._release_textures()
-            self.textures = [self._ctx.texture(size, 4, dtype="f4") for _ in range(self._targets)]
-        zeros = bytes(16 * size[0] * size[1])
-        for texture in self.textures:
-            texture.write(zeros)
 
     def add(self, sums: Sequence[moderngl.Texture], first_row: int, rows: int) -> None:
         """Add what was drawn to these rows of other textures of the same size."""
@@ -86,15 +76,10 @@ class AddedPicture:
         park(self._ctx)
         framebuffer.release()
 
-    def _release_textures(self) -> None:
-        shader.release(*self.textures)
-        self.textures = []
-
     def release(self) -> None:
         """Free everything."""
-        self._triangle.release()
-        shader.release(self._program)
-        self._release_textures()
+        super().release()
+        shader.release(self._triangle, self._program)
 
 
 class Haze:
@@ -149,7 +134,7 @@ class Haze:
         parameters = camera_parameters(self._scene, camera, width, height)
         self._camera.write(parameters.tobytes())
         self._values.write(self._parameters(parameters).tobytes())
-        self._picture.clear((width, height))
+        self._picture.clear(width, height)
         if count:
             self._camera.bind_to_uniform_block(bindings.PARAMETERS)
             self._values.bind_to_uniform_block(_BIND_HAZE)

@@ -13,7 +13,7 @@ from ..gpu import shader
 from ..gpu.framebuffers import frame_of, park
 from ..gpu.records import NONE, PLACEMENT
 from ..gpu.tiles import Tile
-from .splat_sums import SplatSums
+from .splat_sums import Accumulate, SplatSums
 
 KIND_FLAT, KIND_CHART, KIND_PICTURE = 0, 1, 2
 
@@ -58,8 +58,6 @@ class MapAtlas:
         """`size` from `pack`; `placements`: PLACEMENT records, indexed by the receivers. `scratched`: targets that have
         a scratch texture, None for all; splats are added to the others' totals at once, which is right to about
         1e-4."""
-        from .splat_sums import Accumulate
-
         self.ctx = ctx
         self.size = size
         self.targets = targets

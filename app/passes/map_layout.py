@@ -15,7 +15,7 @@ from ..base.errors import UserError
 from ..gpu.records import NONE, PLACEMENT, RECEIVER
 from ..gpu.scene_buffers import SceneBuffers
 from ..gpu.tiles import Tile, pack
-from ..model.geometry.charts import ChartAtlas
+from ..model.geometry.charts import ChartAtlas, build_charts
 from ..model.scene import Camera, Scene
 from ..model.scene_camera import camera_frame, camera_rays
 from .borders import lit_borders
@@ -204,8 +204,6 @@ def _layout_maps(
         else:
             lit = landed is not None or receiver == map_receiver
             side = int(np.clip(picture[0], 256, 1024)) if lit else 64
-            from ..model.geometry.charts import build_charts
-
             atlas = build_charts(buffers.world_meshes[object_index], total_texels=side * side)
             sizes.append((atlas.width, atlas.height))
             plans.append((receiver, None, [], atlas))

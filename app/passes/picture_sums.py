@@ -39,7 +39,7 @@ class PictureSums:
         """Sums of 0 in a picture of this size; whether the size is new."""
         is_new = self.size != (width, height)
         if is_new:
-            self.release()
+            shader.release(*self.textures)
             self.textures = [self._ctx.texture((width, height), 4, dtype="f4") for _ in range(self._targets)]
         for texture in self.textures:
             frame_of(self._ctx, texture).clear()

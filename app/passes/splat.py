@@ -19,7 +19,7 @@ from ..gpu import shader
 from ..gpu.context import check_device
 from ..gpu.framebuffers import adding
 from ..gpu.schema import Field, Struct
-from ..gpu.splat_tables import SplatTables
+from ..gpu.splat_tables import CUMULATIVE_SAMPLES, SplatTables
 from ..gpu.splat_way import way_of
 from .footprint import (
     KIND_WORDS,
@@ -131,8 +131,6 @@ class Splatter:
 
     def draw(self, tables: SplatTables, atlas: MapAtlas) -> None:
         """Add the splats of the last group of photons to the atlas: to its scratch textures, or to its sums."""
-        from ..gpu.splat_tables import CUMULATIVE_SAMPLES
-
         values = PARAMETERS.zeros(1)
         packing = tables.layers | tables.stacked << 16
         values[0] = (atlas.size, (0.5, 0.5), tables.bands, self.footprints.capacity, CUMULATIVE_SAMPLES, packing)

@@ -10,27 +10,24 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
+
+import moderngl
+import numpy as np
 
 from ...base.not_yet import NOT_YET, NotYet
+from ...edit.live_inputs import LiveInputs
 from ...edit.stored_photons import StoredPhotons
 from ...gpu import shader
+from ...gpu.context import Context
 from ...gpu.context_thread import ContextThread, SteppedWork
 from .building import COMPILING, PATIENCE_S
 from .dirty_level import DirtyLevel
 from .engine import LiveEngine
-from .photon_queries import QUERIED_PHOTONS
+from .photon_queries import QUERIED_PHOTONS, CausticSpectrum
+from .stats import LiveStats
 
-if TYPE_CHECKING:
-    import moderngl
-    import numpy as np
-
-    from ...edit.live_inputs import LiveInputs
-    from ...gpu.context import Context
-    from .photon_queries import CausticSpectrum
-    from .stats import LiveStats
-
-    T = TypeVar("T")
+T = TypeVar("T")
 
 OVERRUN_S, OVERRUN_GPU_S = 0.15, 0.02
 """What work may take beyond its budget before the window is drawn without it, where the processor draws and where a

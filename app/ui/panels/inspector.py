@@ -33,6 +33,7 @@ from .crystal_rows import draw_axis, draw_crystal
 from .declared_rows import draw_flags, draw_numbers
 from .environment_rows import draw_environment
 from .glass_values import abbe_text, own_numbers
+from .light_panel import draw_light
 
 _KINDS = {cls.title: cls for cls in MATERIAL_KINDS.values()}
 _UNITS = "units"
@@ -53,8 +54,6 @@ def draw_inspector(state: State, view_model: ViewModel) -> State:
     if selection.kind == "object" and selection.index < len(state.scene.objects):
         return _object(state, view_model, selection.index)
     if selection.kind == "light" and selection.index < len(state.scene.lights):
-        from .light_panel import draw_light
-
         return draw_light(state, view_model)
     if selection.kind == "camera":
         return _scene_camera(state)
