@@ -14,6 +14,7 @@ import numpy as np
 
 from ..model.local_dispersion import plane_of
 from ..model.scene import Dab, Scene, SceneObject, Vec3
+from ..model.vectors import frame_about, unit
 from .objects import with_dabs
 from .projection import View
 from .state import Brush
@@ -137,8 +138,6 @@ def _dab(brush: Brush, place: np.ndarray, radius: float, seconds: float) -> Dab:
 
 def ring(position: Vec3, normal: Vec3, radius: float) -> np.ndarray:
     """A circle of world `radius` round a position in the plane across `normal`: (64, 3)."""
-    across = np.asarray(normal, float)
-    first = np.cross(across, np.eye(3)[np.argmin(np.abs(across))])
-    first = first / np.linalg.norm(first)
+    first, second, _ = frame_about(unit(normal))
     angle = np.linspace(0.0, 2.0 * np.pi, _RING_POINTS, endpoint=False)[:, None]
-    return np.asarray(position, float) + radius * (np.cos(angle) * first + np.sin(angle) * np.cross(across, first))
+    return np.asarray(position, float) + radius * (np.cos(angle) * first + np.sin(angle) * second)

@@ -22,6 +22,14 @@ def unit(vector: ArrayLike) -> np.ndarray:
     return values / np.linalg.norm(values)
 
 
+def frame_about(axis: np.ndarray, guide: ArrayLike | None = None) -> np.ndarray:
+    """Right-handed frame with the unit `axis` (3,), rows first, second, axis: the first as near to `guide` as can be,
+    without one to the world's axis that is farthest from `axis`."""
+    near = np.eye(3)[np.argmin(np.abs(axis))] if guide is None else np.asarray(guide, np.float64)
+    first = unit(near - axis * (near @ axis))
+    return np.stack([first, np.cross(axis, first), axis])
+
+
 def frozen(array: np.ndarray) -> np.ndarray:
     """`array` in one piece of memory, read-only."""
     array = np.ascontiguousarray(array)

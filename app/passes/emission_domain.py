@@ -16,6 +16,7 @@ import numpy as np
 from ..gpu.gpu_space import GpuSpace
 from ..gpu.records import MASK_SIZE
 from ..model.scene import Light, Scene
+from ..model.vectors import frame_about
 
 _COARSE_ANGLE = 0.15
 """Triangles that look larger than this from the light (rad, or of the unit sphere) are subdivided before projection."""
@@ -72,14 +73,6 @@ class EmissionDomain:
         every such stretch.
         """
         return self.rect[2:] / np.sqrt(count)
-
-
-def orthonormal_frame(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors that make a right-handed frame with the unit `axis`."""
-    guide = np.eye(3)[np.argmin(np.abs(axis))]
-    first = guide - axis * (guide @ axis)
-    first /= np.linalg.norm(first)
-    return first, np.cross(axis, first)
 
 
 def azimuthal_plane(directions: np.ndarray) -> np.ndarray:
@@ -192,7 +185,7 @@ def _diverging_domain(
     to_middle = middle - position
     distance = np.linalg.norm(to_middle)
     axis = to_middle / distance if distance > 1e-9 else direction
-    tangent, bitangent = orthonormal_frame(axis)
+    tangent, bitangent, _ = frame_about(axis)
     frame = np.stack([tangent, bitangent, axis])
     triangles = _subdivided(triangles, position)
     relative = _in_frame(triangles - position, frame)
@@ -310,7 +303,7 @@ def _cone_box(axis_local: np.ndarray, outer: float) -> tuple[np.ndarray, np.ndar
     """Bounding box of a cone of directions on the azimuthal plane."""
     if outer > np.pi / 2:
         return np.full(2, -2.0), np.full(2, 2.0)
-    first, second = orthonormal_frame(axis_local)
+    first, second, _ = frame_about(axis_local)
     turn = np.linspace(0.0, 2 * np.pi, 257)[:-1, None, None]
     angle = np.linspace(0.0, outer, 9)[None, :, None]
     directions = np.cos(angle) * axis_local + np.sin(angle) * (np.cos(turn) * first + np.sin(turn) * second)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..model.optics.glass import LINE_D_NM
 from ..model.scene import Light
-from .emission_domain import orthonormal_frame
+from ..model.vectors import frame_about, unit
 from .ray_line import RayLine
 from .ray_paths import Path, RayPaths
 
@@ -164,7 +164,7 @@ class RayFan:
             beam.is_parallel and beam.aperture is not None and not ((points - beam.origin) @ beam.axis > 0.0).any()
         ):
             return None
-        first, second = orthonormal_frame(beam.axis) if beam.aperture is None else (_unit(v) for v in beam.aperture)
+        first, second = frame_about(beam.axis)[:2] if beam.aperture is None else (unit(v) for v in beam.aperture)
         middle = np.zeros(3)
         for side, half in zip(
             (first, second),
@@ -181,17 +181,17 @@ class RayFan:
         """Unit vector across the beam along which the object deviates its middle ray; the level one where the ray
         is not deviated."""
         origin, direction = (
-            (beam.origin + middle, beam.axis) if beam.is_parallel else (beam.origin, _unit(beam.axis + middle))
+            (beam.origin + middle, beam.axis) if beam.is_parallel else (beam.origin, unit(beam.axis + middle))
         )
         path = self._follow(origin[None], direction[None], np.array([LINE_D_NM]))[0]
         bend = np.zeros(3)
         if len(path.points) > 2:
-            leaving = _unit(path.points[-1] - path.points[-2])
+            leaving = unit(path.points[-1] - path.points[-2])
             bend = leaving - (leaving @ beam.axis) * beam.axis
         if np.linalg.norm(bend) > _MIN_BEND:
-            return _unit(bend)
+            return unit(bend)
         level = np.cross(beam.axis, np.asarray(self._scene.camera.up, float))
-        return _unit(level) if np.linalg.norm(level) > 1e-6 else orthonormal_frame(beam.axis)[0]
+        return unit(level) if np.linalg.norm(level) > 1e-6 else frame_about(beam.axis)[0]
 
     def _spread(
         self, beam: _Beam, points: np.ndarray, middle: np.ndarray, across: np.ndarray, rays: int, share: float
@@ -216,7 +216,3 @@ def _chord(aperture: np.ndarray, is_disc: bool, middle: np.ndarray, across: np.n
         return (-b - root) / a, (-b + root) / a
     limits = [((-1.0 - s) / d, (1.0 - s) / d) for s, d in zip(start, step, strict=True) if abs(d) > 1e-12]
     return max(min(pair) for pair in limits), min(max(pair) for pair in limits)
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / np.linalg.norm(vector)

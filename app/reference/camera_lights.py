@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model.scene import Light, Scene
+from ..model.vectors import frame_about
 from .compiling import inlined
-from .photon_emission import frame_of
 from .photon_emit import concentric_disc, search, shone, spot_falloff
 from .vectors import angle_between, combined, cross, dot, length, minus, moved, negated, over
 
@@ -66,7 +66,7 @@ def camera_lights(lights: Sequence[Light], centre: np.ndarray) -> CameraLights:
     begin = 1
     for i, light in enumerate(lights):
         axis = np.asarray(light.direction, float) / np.linalg.norm(light.direction)
-        frame = frame_of(axis, light.tangent)
+        frame = frame_about(axis, light.tangent)
         half = np.array(light.half_extent)
         packed.kind[i] = light.gpu_code
         packed.is_disc[i] = light.is_disc

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..model.scene import Scene
+from ..model.vectors import frame_about
 from .camera_kernel import CausticTables
-from .photon_emission import frame_of
 from .photon_scene import PhotonScene
 
 TEXELS_A_PIXEL = 2.0
@@ -97,7 +97,7 @@ def receiver_planes(scene: Scene, photons: PhotonScene) -> Planes:
             and height <= _FLAT * float(np.ptp(points, axis=0).max())
             and bool((photons.normals[chosen] @ normal > 0.5).all())
         )
-        frame = frame_of(normal, None)
+        frame = frame_about(normal, None)
         plane = (points - points[0]) @ frame[:2].T
         for back in range(2):
             side[index, back] = len(owner)

@@ -18,9 +18,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..model.scene import Light, Scene
+from ..model.vectors import frame_about
 from .photon_emit import AREA, DIRECTIONS, GRID, PLANE
 from .photon_intersect import compiled
 from .photon_scene import Colours, PhotonScene, colours, reflectance_classes
@@ -127,14 +127,6 @@ def density(domain: Domain) -> np.ndarray:
     return np.diff(domain.rows)[:, None] * np.diff(domain.columns, axis=1)
 
 
-def frame_of(axis: np.ndarray, tangent: ArrayLike | None) -> np.ndarray:
-    """Rows tangent, bitangent, axis, right-handed; without a tangent the world axis farthest from `axis` gives it."""
-    guide = np.eye(3)[np.argmin(np.abs(axis))] if tangent is None else np.asarray(tangent, float)
-    first = guide - (guide @ axis) * axis
-    first = first / np.linalg.norm(first)
-    return np.stack([first, np.cross(axis, first), axis])
-
-
 def _distribution(probability: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     total = probability.sum(axis=1)
     rows = np.concatenate([[0.0], np.cumsum(total)])
@@ -149,7 +141,7 @@ def _distribution(probability: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _plane(
     light: Light, triangles: np.ndarray, position: np.ndarray, direction: np.ndarray, reach: float
 ) -> list[Domain]:
-    frame = frame_of(direction, light.tangent)
+    frame = frame_about(direction, light.tangent)
     flat, depth = triangles @ frame[:2].T, triangles @ direction
     tilt = math.tan(light.angular_radius)
     grow = tilt * np.abs(depth)[..., None]
@@ -187,9 +179,9 @@ def _directions(light: Light, triangles: np.ndarray, position: np.ndarray, direc
     lengths = np.linalg.norm(corners, axis=1)
     narrow = size > 0.0 and lengths.min() > 0.0 and ((corners @ axis) / (lengths * size)).min() > _WIDEST_COSINE
     charts = (
-        [frame_of(axis / size, None)]
+        [frame_about(axis / size, None)]
         if narrow
-        else [frame_of(side * e, None) for e in np.eye(3) for side in (1.0, -1.0)]
+        else [frame_about(side * e, None) for e in np.eye(3) for side in (1.0, -1.0)]
     )
     cone = np.array(light.cone)
     found = []
@@ -242,7 +234,7 @@ def _chart(
 
 def _cone_box(axis: np.ndarray, half_angle: float) -> tuple[np.ndarray, np.ndarray]:
     """Bounds (with a margin) of a cone's cut with the plane at distance one; the whole cone lies before it."""
-    frame = frame_of(axis, None)
+    frame = frame_about(axis, None)
     turn = np.linspace(0.0, 2.0 * np.pi, 513)[:, None]
     rim = math.cos(half_angle) * axis + math.sin(half_angle) * (np.cos(turn) * frame[0] + np.sin(turn) * frame[1])
     flat = rim[:, :2] / rim[:, 2:]
@@ -264,7 +256,7 @@ def _area(light: Light, triangles: np.ndarray, position: np.ndarray, direction: 
     corners = triangles.reshape(-1, 3)
     target = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     radius = 1.0001 * float(np.linalg.norm(corners - target, axis=1).max())
-    frame = frame_of(direction, light.tangent)
+    frame = frame_about(direction, light.tangent)
     half = light.half_extent
     u, v = half[0] * frame[0], half[1] * frame[1]
     rim = position + np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) @ np.stack([u, v])
@@ -272,7 +264,7 @@ def _area(light: Light, triangles: np.ndarray, position: np.ndarray, direction: 
         return []  # everything lies behind the light
     way = target - position
     length = np.linalg.norm(way)
-    aim = frame_of(way / length if length > 0.0 else direction, None)
+    aim = frame_about(way / length if length > 0.0 else direction, None)
     even = _distribution(np.full((GRID, GRID), 1.0 / GRID**2))
     domain = Domain(AREA, aim, position, np.zeros(4), *even, light.area, direction)
     return [domain._replace(is_disc=light.is_disc, extended=True, half_u=u, half_v=v, target=target, radius=radius)]

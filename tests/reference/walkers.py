@@ -36,7 +36,7 @@ from spectrasplat.model.lights import PointLight
 from spectrasplat.model.optics.spectrum import constant
 from spectrasplat.model.scene import Camera, Diffuse, Mirror, Scene, SceneObject
 from spectrasplat.model.settings import RenderSettings
-from spectrasplat.passes.emission_domain import orthonormal_frame
+from spectrasplat.model.vectors import frame_about
 from spectrasplat.passes.ray_paths import RayPaths
 from spectrasplat.reference.glasses import D_NM
 from spectrasplat.reference.optics import normalised_derivative, unit
@@ -280,7 +280,7 @@ def by_queries(gl: Context, arrangement: Arrangement, lines_nm: Sequence[float],
     """`count` rays a line over the beam's disc, or over the half of all directions round the arrangement's own."""
     number = np.arange(count) + 0.5
     circle = np.column_stack([np.cos(GOLDEN * number), np.sin(GOLDEN * number)])
-    frame = np.array(orthonormal_frame(arrangement.direction))
+    frame = frame_about(arrangement.direction)[:2]
     if arrangement.radius:
         starts = arrangement.start + arrangement.radius * np.sqrt(number / count)[:, None] * (circle @ frame)
         directions = np.tile(arrangement.direction, (count, 1))

@@ -22,7 +22,7 @@ from ..lights import DirectionalLight, PointLight, SpotLight
 from ..lights.light_file import light_values
 from ..scene import Camera, Light, Material, Scene, SceneObject
 from ..scene_camera import LENS
-from ..vectors import unit
+from ..vectors import frame_about, unit
 from .gltf import LIGHTS, Origins, open_document, read_scene
 from .gltf_document import Additions, GltfDocument, save_document
 from .gltf_materials import EXTRAS, write_gltf_material, write_node_dabs, write_scene_extras
@@ -342,12 +342,9 @@ def _same_mesh(a: Mesh, b: Mesh) -> bool:
 def _look_world(position: Any, forward: Any, up: Any) -> np.ndarray:
     """World matrix of a node that looks along its -z with +y towards `up`."""
     z = -unit(forward)
-    x = np.cross(np.asarray(up, dtype=np.float64), z)
-    if np.linalg.norm(x) < 1e-9:
-        x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x = unit(x)
+    right = np.cross(np.asarray(up, dtype=np.float64), z)
     world = np.eye(4)
-    world[:3, :3] = np.column_stack([x, np.cross(z, x), z])
+    world[:3, :3] = frame_about(z, right if np.linalg.norm(right) >= 1e-9 else None).T
     world[:3, 3] = position
     return world
 

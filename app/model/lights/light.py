@@ -17,7 +17,7 @@ from ...base.errors import UserError
 from ..fields import Number, Part, check_numbers
 from ..io.scene_table import MAX_MAGNITUDE
 from ..optics.spectrum import Spectrum
-from ..vectors import Vec3, unit
+from ..vectors import Vec3, frame_about, unit
 
 if TYPE_CHECKING:
     from .ies_file import Profile
@@ -184,10 +184,7 @@ class Light:
 
     @cached_property
     def _axes(self) -> np.ndarray:
-        axis = unit(self.direction)
-        guide = np.eye(3)[np.argmin(np.abs(axis))] if self.tangent is None else np.asarray(self.tangent, float)
-        first = unit(guide - axis * (guide @ axis))
-        return np.column_stack([first, np.cross(axis, first), axis])
+        return frame_about(unit(self.direction), self.tangent).T
 
     def emits_toward(self, directions: np.ndarray) -> np.ndarray:
         """Which of the unit directions (..., 3) it emits into, bool (...)."""

@@ -27,8 +27,8 @@ from ...model.optics.spectral_tables import SpectralAxis
 from ...model.optics.spectrum import constant
 from ...model.scene import Camera, Dielectric, Diffuse, Light, Material, Mirror, RenderDefaults, Scene, SceneObject
 from ...model.settings import RenderSettings
-from ...model.vectors import vec3
-from ...passes.emission_domain import emission_domain, orthonormal_frame
+from ...model.vectors import frame_about, vec3
+from ...passes.emission_domain import emission_domain
 from ...passes.lattice_slice import Band, LatticeSlice
 from ...passes.trace import FluxTally, TracePass
 from ...reference.emission import Emitter
@@ -112,7 +112,7 @@ def glass(name: str) -> Dielectric:
 
 def screen(centre: ArrayLike, normal: ArrayLike, half: float = 50.0) -> Mesh:
     """A square of side 2·half across `normal`."""
-    side, up = orthonormal_frame(unit(np.asarray(normal, float)))
+    side, up, _ = frame_about(unit(np.asarray(normal, float)))
     corners = [np.asarray(centre) + half * (s * side + t * up) for s, t in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
     return make_mesh("screen", np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
 
