@@ -86,7 +86,8 @@ def stone_at(path: Path, name: str | None, glass: str | None, up: str) -> Stone:
 def write(found: GemReport, path: Path, picture: str = "aset") -> None:
     """Write a report (.html), numbers (.json) or one of the pictures (.png). Raises `UserError`."""
     from ..base.atomic import atomic_output
-    from .gem_page import page, png
+    from ..model.io.scene_pictures import nearest_levels, png_bytes
+    from .gem_page import page
 
     suffix = path.suffix.lower()
     if suffix == ".json":
@@ -94,7 +95,7 @@ def write(found: GemReport, path: Path, picture: str = "aset") -> None:
     elif suffix == ".html":
         data = page(found).encode()
     elif found.pictures:
-        data = png(found.pictures[picture])
+        data = png_bytes(nearest_levels(found.pictures[picture]))
     else:
         raise UserError("it was stopped before there was a picture; nothing was written")
     with atomic_output(path) as temporary:

@@ -9,7 +9,7 @@ import numpy as np
 from ..bench.report.page import Table, inlined, render
 from ..bench.report.style import PALETTE, panels, plot_style, svg_text
 from ..model.gems.report import PICTURES, GemReport
-from ..model.io.scene_pictures import png_bytes
+from ..model.io.scene_pictures import nearest_levels, png_bytes
 
 _COLOURS = ("srd-lambda", "srd", "progressive")
 """Colours of the curves, among those of every report."""
@@ -27,17 +27,10 @@ def page(found: GemReport) -> str:
         name=found.stone.name,
         notes=[f"{sentence}." for sentence in found.stone.notes],
         facts={"glass": glass.name or "glass", "n_d": f"{glass.n_d:.5f}", "n_F − n_C": f"{found.stone.dn:.5f}"},
-        pictures=[(base64.b64encode(png(rgb)).decode(), words) for rgb, words in pictures],
+        pictures=[(base64.b64encode(png_bytes(nearest_levels(rgb))).decode(), words) for rgb, words in pictures],
         figures=Table(("figure", "value", "what it is"), found.rows(), words=("what it is",)),
         curves=inlined(_curves(found), "tilt", "light return of the stone tilted about x, and about y"),
     )
-
-
-def png(rgb: np.ndarray) -> bytes:
-    """A PNG file of linear Rec.709 (H, W, 3), as it is: 1 is white."""
-    from ..base.tone_map import srgb_oetf
-
-    return png_bytes(np.round(255.0 * srgb_oetf(np.clip(rgb, 0.0, 1.0))).astype(np.uint8))
 
 
 def _exposed(rgb: np.ndarray) -> np.ndarray:

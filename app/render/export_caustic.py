@@ -13,8 +13,8 @@ import numpy as np
 from ..base.atomic import atomic_outputs
 from ..base.errors import UserError
 from ..base.image_io import check_finite, save_codes, write_image
-from ..base.tone_map import srgb_oetf
 from ..model.io.lit_mesh import check_usd, texture_path, write_lit_gltf, write_lit_usd
+from ..model.io.scene_pictures import nearest_levels
 from ..model.scene import Scene
 from .bake import written_with
 from .cookie import cookie
@@ -99,7 +99,7 @@ def _write_cookie(
     numbers |= made.numbers() | {"encoding": "8-bit sRGB" if is_png else "linear Rec.709", "white_is": "intensity_cd"}
     with atomic_outputs(*written_with(path)) as (picture, note):
         if is_png:
-            save_codes(picture, np.rint(255.0 * srgb_oetf(np.clip(made.rgb, 0.0, 1.0))).astype(np.uint8))
+            save_codes(picture, nearest_levels(made.rgb))
         else:
             write_image(path, made.rgb, into=picture)
         note.write_text(_text(numbers), encoding="utf-8")

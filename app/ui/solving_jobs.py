@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from ..base.colour_maps import signed_codes
-from ..base.tone_map import srgb_oetf
 from ..edit import requests
 from ..edit.parameters import Stage
+from ..model.io.scene_pictures import nearest_levels
 from ..render.notices import FrameNotices
 from .export_job import ExportJob, Words, settings_of
 from .view_model import Found
@@ -166,7 +166,7 @@ def _check(
         report = yield from _on_thread(
             lambda progress, stopped: check_plate(mesh, glass, rgb, request.distance, progress, stopped)
         )
-        found.keep("plate", Found(of, report.rows(), _codes(report.pictures())))
+        found.keep("plate", Found(of, report.rows(), nearest_levels(report.pictures())))
 
     name = f"{item.name} against {request.target.name}"
     return Words(f"Plate {name}", f"Checked {name}: see the Lens panel.", "The plate was not checked."), work()
@@ -184,15 +184,10 @@ def _judge(request: requests.JudgeStone, state: State, found: FoundPictures) -> 
             rows = tuple((name, f"{value}  {meaning}") for name, value, meaning in report.rows())
             aset, ideal_scope, brightness, fire = report.pictures.values()
             shown = np.vstack([np.hstack([aset, ideal_scope]), np.hstack([brightness, fire])])
-            found.keep("gem", Found((item,), rows, _codes(shown)))
+            found.keep("gem", Found((item,), rows, nearest_levels(shown)))
 
     words = f"Figures of {item.name}", "Figures and pictures are in the Gem panel.", "The stone was not judged."
     return Words(*words), work()
-
-
-def _codes(rgb: np.ndarray) -> np.ndarray:
-    """uint8, of linear Rec.709 as it is."""
-    return np.round(255.0 * srgb_oetf(np.clip(rgb, 0.0, 1.0))).astype(np.uint8)
 
 
 def _on_thread(work: Callable[[Callable[[float, str], None], Callable[[], bool]], T]) -> Generator[float, None, T]:

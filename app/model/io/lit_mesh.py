@@ -16,11 +16,10 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...base.image_io import write_image
-from ...base.tone_map import srgb_oetf
 from ..geometry.mesh_health import welded_corners
 from ..staging import Y_UP_TO_Z_UP, UpAxis
 from .gltf_document import Additions, GltfDocument, write_document
-from .scene_pictures import png_bytes
+from .scene_pictures import nearest_levels, png_bytes
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,7 @@ def write_lit_gltf(lit: LitMesh, path: Path, into: Path) -> None:
     json: dict[str, Any] = {"asset": {"version": "2.0", "generator": "SpectraSplat"}, "scene": 0}
     new = Additions(json, buffer=0)
     primitive = new.primitive(lit.corners, lit.normals, lit.uv) | {"material": 0}
-    codes = np.rint(255.0 * srgb_oetf(np.clip(lit.emission / lit.strength, 0.0, 1.0))).astype(np.uint8)
-    image = new.view(png_bytes(codes))
+    image = new.view(png_bytes(nearest_levels(lit.emission / lit.strength)))
     node: dict[str, Any] = {"name": lit.name, "mesh": 0}
     if lit.up == "z":
         node["matrix"] = Y_UP_TO_Z_UP.ravel().tolist()  # by columns: its transpose, which turns back

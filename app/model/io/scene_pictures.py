@@ -75,10 +75,8 @@ def kept_name(source: str, scene_path: Path) -> str:
     """
     if files.may_read(source, scene_path.parent) or not files.is_file(source):
         return relative_name(source, scene_path.parent)
-    try:
+    with files.reading(source, f"check the file, which is copied beside {scene_path}"):
         data = files.read_bytes(source, files.DATA_BYTES)
-    except OSError as error:
-        raise UserError(f"cannot copy {source} beside {scene_path}: {error.strerror}; check the file") from error
     name = Path(source)
     digest = hashlib.sha256(data).hexdigest()[:12]
     target = folder_beside(scene_path, "files") / f"{name.stem[:60]}_{digest}{name.suffix}"

@@ -11,9 +11,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, cast
 
+import numpy as np
+
 from ...base import files
 from ...base.errors import UserError, nearest_names
-from ..vectors import Vec3
+from ...base.tone_map import srgb_eotf
+from ..vectors import Vec3, vec3
 
 MAX_MAGNITUDE = 1e30
 """Largest number in a scene: the renderer's float32 ends at 3e38, and sums need room."""
@@ -206,12 +209,10 @@ class SceneTable:
         try:
             if not text.startswith("#") or len(digits) != 6:
                 raise ValueError
-            encoded = [byte / 255.0 for byte in bytes.fromhex(digits)]
+            encoded = np.array([*bytes.fromhex(digits)]) / 255.0
         except ValueError:
             self.fail(key, f'is {_show(text)} but a colour in quotes must read "#rrggbb"')
-        # IEC 61966-2-1 decoding.
-        r, g, b = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded)
-        return r, g, b
+        return vec3(srgb_eotf(encoded))
 
     def _as_number(self, key: str, value: Any, infinite: bool) -> float:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
