@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from ..base.colour_maps import signed_codes
 from ..base.errors import UserError
 from ..base.generators import finished
-from ..base.image_io import save_codes
+from ..base.image_io import png_bytes, save_codes
 from ..commands.solving_table import GRADIENT_SIZE
-from ..model.io.scene_pictures import png_bytes
 from .arguments import Count, Size, settings_of
 from .device import Cancel, Progress, Report, run
 from .picture import Floats

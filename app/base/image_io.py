@@ -148,6 +148,15 @@ def shown_bytes(
     return buffer.getvalue()
 
 
+def png_bytes(codes: np.ndarray) -> bytes:
+    """A PNG file of sRGB codes, uint8 (H, W, 3)."""
+    from PIL import Image
+
+    buffer = io.BytesIO()
+    Image.fromarray(codes).save(buffer, "PNG")
+    return buffer.getvalue()
+
+
 def _developed(rgb: np.ndarray, exposure_ev: float, glare: float, antialias: bool) -> tuple[np.ndarray, Extras]:
     """sRGB codes of a picture to look at, and how it was exposed."""
     ev = auto_exposure(rgb) + exposure_ev

@@ -3,7 +3,6 @@ numbered PNGs that can be resumed."""
 
 from __future__ import annotations
 
-import io
 import json
 import math
 import os
@@ -17,7 +16,7 @@ import numpy as np
 from . import files
 from .atomic import atomic_output, check_writable
 from .errors import UserError
-from .image_io import SHOWN_SUFFIXES, SUFFIXES, check_side
+from .image_io import SHOWN_SUFFIXES, SUFFIXES, check_side, png_bytes
 from .locks import locked
 
 MANIFEST = "animation.json"
@@ -220,10 +219,10 @@ class Frames:
 
     def write(self, index: int, codes: np.ndarray) -> None:
         """Write a frame, whole or not at all."""
-        self.write_png(index, frame_bytes(codes))
+        self.write_png(index, png_bytes(codes))
 
     def write_png(self, index: int, png: bytes) -> None:
-        """The same of a frame that `frame_bytes` has made elsewhere."""
+        """The same of a frame that `png_bytes` has made elsewhere."""
         with atomic_output(self.path(index)) as temporary:
             temporary.write_bytes(png)
 
@@ -273,15 +272,6 @@ Sink = Film | Frames
 def frame_name(index: int, suffix: str) -> str:
     """What a frame's file is called."""
     return f"{index:0{_DIGITS}}{suffix}"
-
-
-def frame_bytes(codes: np.ndarray) -> bytes:
-    """A frame, uint8 (H, W, 3), as the PNG that `Frames` keeps."""
-    from PIL import Image
-
-    into = io.BytesIO()
-    Image.fromarray(codes).save(into, format="PNG", compress_level=6)
-    return into.getvalue()
 
 
 def _exposure(value: object) -> float | None:

@@ -86,7 +86,8 @@ def stone_at(path: Path, name: str | None, glass: str | None, up: str) -> Stone:
 def write(found: GemReport, path: Path, picture: str = "aset") -> None:
     """Write a report (.html), numbers (.json) or one of the pictures (.png). Raises `UserError`."""
     from ..base.atomic import atomic_output
-    from ..model.io.scene_pictures import nearest_levels, png_bytes
+    from ..base.image_io import png_bytes
+    from ..model.io.scene_pictures import nearest_levels
     from .gem_page import page
 
     suffix = path.suffix.lower()

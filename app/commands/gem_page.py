@@ -6,10 +6,11 @@ import base64
 
 import numpy as np
 
+from ..base.image_io import png_bytes
 from ..bench.report.page import Table, inlined, render
 from ..bench.report.style import PALETTE, panels, plot_style, svg_text
 from ..model.gems.report import PICTURES, GemReport
-from ..model.io.scene_pictures import nearest_levels, png_bytes
+from ..model.io.scene_pictures import nearest_levels
 
 _COLOURS = ("srd-lambda", "srd", "progressive")
 """Colours of the curves, among those of every report."""

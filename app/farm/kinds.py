@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..base.image_io import check_finite
-from ..base.movie import Frames, frame_bytes
+from ..base.image_io import check_finite, png_bytes
+from ..base.movie import Frames
 from ..base.tone_map import auto_exposure
 from ..edit.animation import Animation
 from ..edit.parameters import Stage
@@ -60,7 +60,7 @@ def _draw_frame(desk: Desk, of: _Frames, report: Report, index: int, base_ev: fl
     notices = tuple(frame_notices(renderer.light, stage.camera, of.settings, rgb))
     if base_ev is None:
         return _Frame(rgb, b"", notices)
-    return _Frame(None, frame_bytes(developed(rgb, base_ev + stage.exposure_ev, stage.scene.render)), notices)
+    return _Frame(None, png_bytes(developed(rgb, base_ev + stage.exposure_ev, stage.scene.render)), notices)
 
 
 class FramesJob:

@@ -12,12 +12,13 @@ from urllib.parse import unquote
 
 import numpy as np
 
+from ...base.image_io import png_bytes
 from ..naming import Unshown
 from ..texture import Texture
 from ..vectors import frozen
 from .gltf_document import Additions, GltfDocument
 from .picture_files import decode_8bit
-from .scene_pictures import nearest_levels, picture_name, png_bytes
+from .scene_pictures import nearest_levels, picture_name
 
 _CLAMP, _MIRRORED, _REPEAT = 33071, 33648, 10497
 _FORMATS = ("image/png", "image/jpeg")

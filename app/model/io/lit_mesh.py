@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import UserError
-from ...base.image_io import write_image
+from ...base.image_io import png_bytes, write_image
 from ..geometry.mesh_health import welded_corners
 from ..staging import Y_UP_TO_Z_UP, UpAxis
 from .gltf_document import Additions, GltfDocument, write_document
-from .scene_pictures import nearest_levels, png_bytes
+from .scene_pictures import nearest_levels
 
 
 @dataclass(frozen=True)

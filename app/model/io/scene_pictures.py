@@ -26,11 +26,11 @@ def picture_file(rgb: np.ndarray, source: str | None, scene_path: Path) -> str:
     if source is not None and files.is_file(path):
         return f"{kept_name(str(path), scene_path)}:{part}".rstrip(":")
     folder = folder_beside(scene_path, "pictures")
+    from ...base.image_io import png_bytes, write_image
+
     levels = eight_bit_levels(rgb)
     target = folder / f"{picture_name(rgb)}{'.exr' if levels is None else '.png'}"
     if levels is None:
-        from ...base.image_io import write_image
-
         write_image(target, rgb)
     else:
         with atomic_output(target) as temporary:
@@ -54,17 +54,6 @@ def eight_bit_levels(rgb: np.ndarray) -> np.ndarray | None:
     levels = nearest_levels(rgb)
     decoded = srgb_eotf(np.arange(256) / 255.0).astype(np.float32)
     return levels if np.array_equal(decoded[levels], rgb) else None
-
-
-def png_bytes(levels: np.ndarray) -> bytes:
-    """A PNG file of uint8 (H, W, 3)."""
-    import io
-
-    from PIL import Image
-
-    buffer = io.BytesIO()
-    Image.fromarray(levels).save(buffer, "PNG")
-    return buffer.getvalue()
 
 
 def kept_name(source: str, scene_path: Path) -> str:
