@@ -15,9 +15,8 @@ from ..edit.stored_photons import StoredPhotons as Photons
 from ..model.optics.lens_design import LensTable
 from ..model.plate_check import PlateReport
 from .catalogue import Glass, glass, glasses
-from .gems import GemFigures, GemReport, gem
+from .figures import GemFigures, GemReport, gem, lens_check, lens_table
 from .gradient import Gradient, gradient
-from .lenses import lens_check, lens_table
 from .pages import page
 from .picture import CausticMap, Picture, Statistics
 from .rendering import caustic, render
