@@ -6,13 +6,15 @@ Callbacks run in the caller's thread, between the worker's steps.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from concurrent.futures import ThreadPoolExecutor, wait
+from contextlib import closing
 from queue import Empty, SimpleQueue
 from threading import Event
 from typing import TYPE_CHECKING, Self, TypeVar
 
 from ..base.errors import UserError, sentence_of
+from ..base.generators import finished
 
 if TYPE_CHECKING:
     from ..gpu.context import Context
@@ -88,6 +90,28 @@ def run(work: Work[T], progress: Progress | None = None, cancel: Cancel | None =
     """What `work` gives on a device of its own, see `Device.run`."""
     with Device() as device:
         return device.run(work, progress, cancel)
+
+
+def worked_out(
+    what: str,
+    begin: Callable[[Context], Generator[float, None, T]],
+    progress: Progress | None,
+    cancel: Cancel | None,
+    stopped: str = "it was stopped before there was an answer: let it go on for longer",
+) -> T:
+    """What the steps of `begin` return, on a device of its own. Raises `UserError`, which says `stopped`, where the
+    caller cancels."""
+
+    def work(context: Context, report: Report, is_cancelled: Cancel) -> T:
+        def at_pause(share: float) -> None:
+            report(share, what)
+            if is_cancelled():
+                raise UserError(stopped)
+
+        with closing(begin(context)) as steps:
+            return finished(steps, at_pause)
+
+    return run(work, progress, cancel)
 
 
 def _context() -> Context:

@@ -4,29 +4,22 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..base.colour_maps import signed_codes
 from ..base.errors import UserError
-from ..base.generators import finished
 from ..base.image_io import png_bytes, save_codes
 from ..commands.solving_table import GRADIENT_SIZE
 from .arguments import Count, Size, settings_of
-from .device import Cancel, Progress, Report, run
+from .device import Cancel, Progress, worked_out
 from .picture import Floats
 from .rendering import check_receiver
 from .scene import Scene
-
-if TYPE_CHECKING:
-    from ..gpu.context import Context
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -77,22 +70,6 @@ class Gradient:
         return f"Gradient('{self.of}', {width}×{height}, {found}, {self.seconds:.1f} s)"
 
 
-def solved(
-    begin: Callable[[Context], Generator[float, None, T]], progress: Progress | None, cancel: Cancel | None
-) -> T:
-    """What the steps that `begin` returns find. Raises `UserError` where they were stopped."""
-
-    def work(context: Context, report: Report, stopped: Cancel) -> T:
-        def paused(share: float) -> None:
-            report(share, "solving")
-            if stopped():
-                raise UserError("it was stopped before there was an answer: let it go on for longer")
-
-        return finished(begin(context), paused)
-
-    return run(work, progress, cancel)
-
-
 def gradient(
     scene: Scene,
     of: str,
@@ -125,7 +102,9 @@ def gradient(
 
     stage, started = Stage(scene._model, scene._model.camera), time.perf_counter()
     steps = None if step is None else {of: float(step)}
-    found = solved(lambda context: gradient(context, stage, settings, [of], steps, noise=True), progress, cancel)
+    found = worked_out(
+        "solving", lambda context: gradient(context, stage, settings, [of], steps, noise=True), progress, cancel
+    )
     (its,), base = found.derivatives, found.base
     return Gradient(
         of=of,

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import closing
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..base.errors import UserError
-from ..base.generators import finished
 from .arguments import Count, Size, check_scene, settings_of
-from .device import Cancel, Progress, Report, run
+from .device import Cancel, Progress, worked_out
 from .scene import Scene
 
 if TYPE_CHECKING:
-    from ..gpu.context import Context
     from ..render.page.page import Page
 
 
@@ -45,13 +41,11 @@ def page(
     said = words.description if description is None else description
     words = replace(words, title=title or words.title, description=said)
 
-    def work(context: Context, report: Report, stopped: Cancel) -> Page:
-        def told(share: float) -> None:
-            if stopped():
-                raise UserError("the page was given up before it was whole")
-            report(share, "making the page")
-
-        with closing(page_steps(context, Stage(model, model.camera), settings, receiver, words)) as steps:
-            return finished(steps, told)
-
-    return run(work, progress, cancel)
+    stage = Stage(model, model.camera)
+    return worked_out(
+        "making the page",
+        lambda context: page_steps(context, stage, settings, receiver, words),
+        progress,
+        cancel,
+        "the page was given up before it was whole",
+    )

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base.errors import UserError
 from ..edit.solved import Fit, Match, Ranked
 from .arguments import Count, check_scene, settings_of
-from .device import Cancel, Progress
-from .gradient import solved
+from .device import Cancel, Progress, worked_out
 from .rendering import check_receiver
 from .scene import Scene
 
@@ -101,7 +100,7 @@ def _run(
     from ..render.solving import solution
 
     wish = Stage(scene._model, scene._model.camera), settings, receiver, values, between, width
-    return solved(lambda context: solution(context, *wish, work), progress, cancel)
+    return worked_out("solving", lambda context: solution(context, *wish, work), progress, cancel)
 
 
 def _values(target: ArrayLike | str | os.PathLike[str]) -> NDArray[np.float64]:
