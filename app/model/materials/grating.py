@@ -170,11 +170,21 @@ class _Orders(Part):
         return {"orders": list(value.orders), "efficiency": efficiency}
 
 
-def leaves_sheet(mesh: Mesh, direction: Vec3) -> bool:
-    """Whether it runs along the normal of some face, where nothing of it lies in the sheet."""
+def check_sheet(mesh: Mesh, along: Vec3, what: str, key: str, name: str, file_name: str) -> None:
+    """Raise UserError where the mesh of the object `name` is no sheet for `what`, or the direction `along`, which
+    `key` gives, is the normal of some face, so that nothing of it lies in the sheet."""
+    if mesh.is_closed:
+        raise UserError(
+            f"{file_name}: object '{name}' is a closed solid and a {what} a thin sheet; give it an open shape such as "
+            "'plane' or 'disc', before the solid if need be"
+        )
     normals = mesh.face_normals()
     normals = normals[normals.any(axis=1)]
-    return bool(np.any(np.linalg.norm(np.cross(normals, np.asarray(direction, float)), axis=1) < _MIN_SINE))
+    if np.any(np.linalg.norm(np.cross(normals, np.asarray(along, float)), axis=1) < _MIN_SINE):
+        raise UserError(
+            f"{file_name}: the {key} of {what} '{name}' runs along the normal of its surface; choose one that lies in "
+            "the surface"
+        )
 
 
 @dataclass(frozen=True)
@@ -305,16 +315,7 @@ class Grating(Material):
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Thin sheets only, whose lines lie in them."""
-        if mesh.is_closed:
-            raise UserError(
-                f"{file_name}: object '{name}' is a closed solid and a grating a thin sheet; "
-                "give it an open shape such as 'plane' or 'disc', before the solid if need be"
-            )
-        if leaves_sheet(mesh, self.direction):
-            raise UserError(
-                f"{file_name}: the lines of grating '{name}' run along the normal of its surface; "
-                "choose a 'direction' that lies in the surface"
-            )
+        check_sheet(mesh, self.direction, "grating", "direction", name, file_name)
         try:
             _ = self.relief
         except UserError as error:

@@ -6,11 +6,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from ...base.errors import UserError
 from ..fields import Animated, Direction, Number, Row
 from ..optics.glass import Dispersion
 from ..vectors import Vec3
-from .grating import WAVELENGTH, leaves_sheet
+from .grating import WAVELENGTH, check_sheet
 from .material import Material
 
 if TYPE_CHECKING:
@@ -92,13 +91,4 @@ class Polariser(Material):
 
     def check_on(self, mesh: Mesh, name: str, file_name: str) -> None:
         """Thin sheets only, in which the axis lies."""
-        if mesh.is_closed:
-            raise UserError(
-                f"{file_name}: object '{name}' is a closed solid and a polariser a thin sheet; "
-                "give it an open shape such as 'plane' or 'disc'"
-            )
-        if leaves_sheet(mesh, self.axis):
-            raise UserError(
-                f"{file_name}: the axis of polariser '{name}' runs along the normal of its surface; "
-                "choose an 'axis' that lies in the surface"
-            )
+        check_sheet(mesh, self.axis, "polariser", "axis", name, file_name)
