@@ -19,13 +19,10 @@ if TYPE_CHECKING:
 
 def __getattr__(name: str) -> object:
     """What `api` offers, imported when it is first asked for: the command line starts without it."""
-    if name == "render":
-        return import_module(".render", __name__)  # which can be called
     api = None if name.startswith("_") else import_module(".api", __name__)
-    offered = "render" if name == "called_render" else name
-    if api is None or offered not in api.__all__:
+    if api is None or name not in api.__all__:
         raise AttributeError(f"module 'spectrasplat' has no attribute '{name}'")
-    return getattr(api, offered)
+    return getattr(api, name)
 
 
 def __dir__() -> list[str]:

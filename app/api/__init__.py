@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from types import ModuleType
 from typing import Any
 
+from .. import render as render_package
 from ..base.errors import UserError
 from ..base.paths import shipped_scenes
 from ..edit.stored_photons import StoredPhotons as Photons
@@ -67,6 +69,17 @@ __all__ = [
     "sweep",
     "trace",
 ]
+
+
+class _Renders(ModuleType):
+    """Python gives a package and a function of one name one place: `spectrasplat.render` is the package, and calling it
+    is `render` from here."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        return render(*arguments, **options)
+
+
+render_package.__class__ = _Renders
 
 
 def load(source: str | os.PathLike[str] | Mapping[str, Any]) -> Scene:
