@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from .opened import check_unread
 from .printing import note, show, table
 from .scenes import find_scene
 
@@ -52,6 +53,7 @@ def lens_check(options: LensCheck) -> int:
     for sentence in dict.fromkeys(notes):
         note(sentence)
     show(table(options.plate.name, ("what", f"lengths in its unit, glass {report.plate.glass.name}"), report.rows()))
+    check_unread(options.output)
     if options.output is not None:
         write_image(options.output, report.pictures())
     return INTERRUPTED if interrupted() else 0

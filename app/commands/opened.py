@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable, Generator
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from click.exceptions import Exit
@@ -38,15 +39,21 @@ def open_scene(values: OpensScene) -> Scene:
         from ..edit.opening import open_scene as opened
 
         scene = opened(path, opening)
-    output = getattr(values, "output", None)
-    if output is not None and files.was_read(output):
-        raise UserError(f"cannot write {output}: it is the scene itself, or a file that it needs; choose another name")
+    check_unread(getattr(values, "output", None))
     camera, defaults = given_for("camera", values), given_for("render", values)
     if camera:
         scene = replace(scene, camera=replace(scene.camera, **camera))
     if "focus_distance" in camera and scene.camera.lens_radius == 0.0:
         raise UserError("--focus-distance changes nothing where the lens has no radius: give --lens-radius as well")
     return replace(scene, render=replace(scene.render, **defaults)) if defaults else scene
+
+
+def check_unread(output: Path | None) -> None:
+    """Raise `UserError` where an output would replace what this process has read to make it."""
+    if output is not None and files.was_read(output):
+        raise UserError(
+            f"cannot write {output}: it is the scene itself, or a file that this is made of; choose another name"
+        )
 
 
 def note_assumptions(scene: Scene) -> None:

@@ -177,7 +177,7 @@ OUTPUTS = {
     "pipe": Case(PLAIN, said("pipe.png", "ordinary file"), output="pipe.png"),
     "picture that it shows": Case(
         PLAIN + '[environment]\nkind = "map"\nfile = "sky.npy"\n',
-        said("write sky.npy", "a file that it needs", "another name"),
+        said("write sky.npy", "a file that this is made of", "another name"),
         files={"sky.npy": npy(np.full((2, 4, 3), 0.5, np.float32))},
         output="sky.npy",
     ),

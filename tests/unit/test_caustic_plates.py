@@ -10,6 +10,7 @@ from reference.caustic_plates import densities, picture, plate
 from spectrasplat.base.errors import UserError
 from spectrasplat.base.image_io import write_image
 from spectrasplat.commands.lens import check
+from spectrasplat.commands.opened import check_unread
 from spectrasplat.model.geometry import primitives
 from spectrasplat.model.geometry.mesh import Mesh
 from spectrasplat.model.io.mesh_io import load_mesh, save_ply
@@ -69,6 +70,8 @@ def test_a_plate_is_checked_against_its_target(tmp_path: Path, shaped: str) -> N
     wanted = picture() if shaped == "+z" else np.rot90(picture())
     write_image(tmp_path / "target.npy", wanted.astype(np.float32))
     report = check(tmp_path / "plate.ply", tmp_path / "target.npy", "PMMA", DISTANCE if shaped == "+z" else None, [])
+    with pytest.raises(UserError, match=r"target\.npy.* choose another name"):
+        check_unread(tmp_path / "target.npy")
     assert report.plate.side == shaped and report.flat_first
     assert report.distance == pytest.approx(DISTANCE, rel=0.1)
     assert report.focal_distance == pytest.approx(DISTANCE, rel=0.1)
