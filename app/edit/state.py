@@ -20,6 +20,8 @@ Tool = Literal["select", "move", "rotate", "scale", "brush", "pull", "measure"]
 CompareMode = Literal["off", "hold", "wipe", "error"]
 Theme = Literal["dark", "light"]
 ToneCurve = Literal["spectrasplat", "aces", "reinhard", "linear"]
+TARGET_PHOTONS = 32_000_000
+"""Photons after which a picture of the viewer is finished, unless the user says otherwise."""
 SOLO_START_NM = 550.0
 """Where single-wavelength display starts: green, which every white light has."""
 
@@ -136,7 +138,7 @@ class Preferences:
 
     theme: Theme = "dark"
     ui_scale: float = 1.0
-    target_photons: int = 32_000_000
+    target_photons: int = TARGET_PHOTONS
     refine_when_still: bool = True
     """Trace again with the new glass once the interface is still, after an edit that was only splatted again."""
     panels: Panels = Panels()

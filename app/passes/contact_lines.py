@@ -29,6 +29,8 @@ next to it."""
 ALL_SEEN = 0xFFFF
 """Word of a texel that holds no contact."""
 _SAMPLES_AT_ONCE = 1 << 22
+_SIDE = 8
+"""Side of a work group of `light/contact.comp`."""
 _NEAREST = 1e-4
 """Share of the farthest corner's depth at which what is drawn begins, however near the camera."""
 _TIE = 4e-6
@@ -122,7 +124,7 @@ class _Drawn:
             words.bind_to_image(0, read=False, write=True)
             self._pack["first"].value = tile.x, tile.y + first
             self._pack["count"].value = tile.width, count
-            self._pack.run(-(-tile.width // 8), -(-count // 8))
+            self._pack.run(-(-tile.width // _SIDE), -(-count // _SIDE))
             ctx.finish()
             ctx.detect_framebuffer(0).use()
             shader.release(frame, depth, seen)

@@ -22,6 +22,10 @@ SURVEY_TAKES, SURVEY_KEPT = 1, 2
 """What a sample's parameters say of it: it is one of a survey, or even pixels keep what a survey found."""
 SURVEY_SAMPLES = 2
 """Samples of so many lookups each that show, before a still's first sample, which pixels are even."""
+_GOLDEN = 0.6180339887498949
+"""Steps of the most even sequence over [0, 1): the golden ratio's inverse."""
+_PLASTIC = np.array([0.7548776662466927, 0.5698402909980532])
+"""Those over a square, inverse powers of the plastic number: Roberts' R2."""
 _SURVEY_GRID = (4, 2)
 """Columns and rows of a survey's lookups in a pixel: SURVEY_SAMPLES · LOOKS together."""
 
@@ -48,7 +52,7 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
     golden-ratio lattice."""
     if is_in_strips(samples, offset):
         return np.column_stack([(np.arange(samples) + 0.5) / samples, np.full(samples, 0.5)])
-    shift = offset * np.array([0.7548776662466927, 0.5698402909980532])
+    shift = offset * _PLASTIC
     index = np.arange(samples)
     power = samples.bit_length() - 1
     if samples == 1 << power:
@@ -60,8 +64,7 @@ def pixel_lattice(samples: int, offset: int) -> np.ndarray:
             direction ^= direction >> 1
         fine = np.floor((shift + 0.5 / samples) % 1.0 * (1 << 30)).astype(np.int64)
         return ((np.column_stack([index, turned]) << (30 - power)) ^ fine) / float(1 << 30)
-    golden = 0.6180339887498949
-    rank = np.argsort(np.argsort((0.5 + index * golden) % 1.0))
+    rank = np.argsort(np.argsort((0.5 + index * _GOLDEN) % 1.0))
     return ((np.column_stack([index, rank]) + 0.5) / samples + shift) % 1.0
 
 

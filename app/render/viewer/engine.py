@@ -17,6 +17,7 @@ import numpy as np
 
 from ...base.errors import UserError
 from ...edit.live_inputs import LiveInputs
+from ...edit.state import TARGET_PHOTONS
 from ...gpu import shader
 from ...gpu.context import Context
 from ...gpu.device_traits import Budget
@@ -44,6 +45,8 @@ PREVIEW_S = 0.016
 """What a coarse picture should take on a software renderer."""
 PREVIEW_GPU_S = 0.004
 """What a coarse picture should take on a GPU."""
+FIRST_PREVIEW, PREVIEW_PHOTONS = 1 << 13, (1 << 12, 1 << 24)
+"""Photons of a coarse picture: of the first one, and at least and at most."""
 HELD = 4
 """First passes' photons, at most, for which what is shown stays although the same light is being traced anew."""
 CAMERA_SHARE = 0.4
@@ -65,11 +68,11 @@ class LiveEngine(EngineAnswers):
         self.budget = budget or context.traits.viewer
         self.preview_seconds = PREVIEW_S if context.is_software else PREVIEW_GPU_S
         """What a coarse picture should take."""
-        self._target_photons = 32_000_000
+        self._target_photons = TARGET_PHOTONS
         self._splatting: Iterator[None] = iter(())
         self._tracing: Iterator[None] = iter(())
         self._maps: CausticMaps | None = None
-        self._preview_photons = 1 << 13
+        self._preview_photons = FIRST_PREVIEW
         self._frame_s = 0.0
         self._planner = FramePlanner(context) if budget is None and context.traits.work_is_queued else None
         """Where given, says how many photons a frame has; where not, batches and previews have sizes of their own."""
@@ -351,7 +354,7 @@ class LiveEngine(EngineAnswers):
             return
         took = time.perf_counter() - started - self._shown.light.beam_seconds
         self._preview_photons = int(
-            np.clip(self._preview_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), 1 << 12, 1 << 24)
+            np.clip(self._preview_photons * np.clip(seconds / max(took, 1e-4), 0.5, 2.0), *PREVIEW_PHOTONS)
         )
 
     def _show_for_now(self, maps: LightMaps) -> None:

@@ -41,6 +41,8 @@ DIRECT_S = 0.5
 MOVED_S = 0.1
 """`DIRECT_S` while things are moved, whose light and tree take time as well."""
 DISPATCH_SECONDS = 0.008
+_SIDE = 8
+"""Side of a work group of `camera/average.comp`."""
 FIRST_S = 0.06
 """What glass may take in the first picture of a view that nothing moves in."""
 SETTLED = 8
@@ -455,7 +457,7 @@ class LiveCamera:
         radiance.bind_to_image(0, read=True, write=False)
         self.picture.bind_to_image(1, read=False, write=True)
         self._average["scale"].value = scale
-        self._average.run(-(-radiance.width // 8), -(-radiance.height // 8))
+        self._average.run(-(-radiance.width // _SIDE), -(-radiance.height // _SIDE))
         self._context.ctx.memory_barrier()
 
     def release(self) -> None:
