@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
-from .current import ALL, CURRENT, FAINT, LAY, SOME, UNKNOWN, distance_at, halve, push_both
+from .current import ALL, CURRENT, FAINT, LAY, SOME, UNKNOWN, distance_at, halve, may_bend, push_both
 from .facets import MAX_CORNERS
 from .leaves import passes
 from .nodes import (
@@ -69,7 +69,7 @@ def at_facet(nodes, facets, solids, tables, sources, work):
         return
     if not is_parallel and beam.bend >= 0.0:
         bend = is_curved(beam, facets, solids, tables, source, work.tolerance, work)
-        if bend > 1.0 and power_as(beam, beam, tables, work) > FAINT * work.threshold:
+        if power > FAINT * work.threshold and bend > may_bend(power, work):
             low, high = halve_space(beam, nodes[work.top], work)
             beam.total = nodes[work.top].total = LAY
             push_both(nodes, low, high, work)

@@ -17,6 +17,16 @@ LAY, UNKNOWN, SOME, ALL = -2, -1, 0, 1
 of a larger outline."""
 FAINT = 0.03
 """Share of the threshold below which a beam is not halved, nor a polygon that misplaces less light."""
+WEAKEST_BENT = 16.0
+"""Tolerances that rays of a beam as weak as the threshold may miss the affine map by, before it is halved. Stronger
+ones may miss it by as much less, down to one: what is misplaced counts by its light, and of slivers that are swept over
+facets some is lost."""
+
+
+@part
+def may_bend(power, work):
+    """Tolerances that rays of a beam with this power may miss the affine map by."""
+    return max(WEAKEST_BENT * min(work.threshold / power, 1.0), 1.0)
 
 
 @part

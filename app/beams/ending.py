@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .compiling import part
-from .current import CURRENT, FAINT, SPARE, halve, push_both
+from .current import CURRENT, FAINT, SPARE, halve, may_bend, push_both
 from .leaves import anchor_density, density_slope, lay_leaf, passes, plane_map
 from .nodes import LINES, STATIC, area_of, copy, first_place, last_place, lay_out
 from .rays import PARALLEL, REFLECT
@@ -139,7 +139,7 @@ def end(nodes, facets, solids, tables, sources, leaf, edge, corner, work):
     bend = 0.0
     if room and not is_parallel and kind == LEAF_RECEIVER:
         bend = is_curved(beam, facets, solids, tables, source, tolerance, work)
-    if bend > 1.0:
+    if bend > 0.0 and bend > may_bend(power, work):
         low, high = halve_space(beam, nodes[work.top], work)
         push_both(nodes, low, high, work)
         return

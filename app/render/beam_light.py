@@ -63,9 +63,9 @@ Counted, not timed: a scene is rendered alike on every machine."""
 MANY = 800.0
 """Beams of a survey above which photons carry all where weak beams play roulette, which is noisier: the tail of a cut
 stone holds much of its picture."""
-_LITTLE, _MANY_CUTS = 0.01, 4.0
-"""Share of what beams leave to photons, and beams' worth of work for each that is followed: where a survey's land less
-and take more, photons draw the picture and beams only take time."""
+_UNCOUNTED = 0.1
+"""Share of its light whose end a survey may not know: where rays are that far from parallel behind wide facets, what
+beams draw is wrong as well."""
 _STEP_FACETS = 60
 """A step costs as much as it takes to test so many facets, besides those of the scene."""
 _PICTURE_SHARE = 0.125
@@ -200,12 +200,12 @@ class BeamLight:
                 "weak beams of lights with emission lines over a continuum are so many that photons leave less noise"
             )
             return
-        lands, goes_on = (sum(float(sums[k]) for sums in strongest.sums.values()) for k in (SUM_DEPOSITED, SUM_LEFT))
+        lands = sum(float(sums[SUM_DEPOSITED]) for sums in strongest.sums.values())
         if _left(strongest) > lands:
             self.why_not = "most of their light lands on what is not flat, which photons draw"
             return
-        if lands < _LITTLE * goes_on and strongest.spent() > _MANY_CUTS * strongest.followed():
-            self.why_not = "they are cut into so many that hardly any gets as far as a receiver"
+        if _uncounted(strongest) > _UNCOUNTED:
+            self.why_not = "rays behind wide facets are too far from parallel to be followed together"
             return
         self.found, self._survey_polygons = found, found.polygons
         self.carried = {light: objects for light, objects in found.carried.items() if objects}
@@ -414,6 +414,14 @@ def _found(finder: BeamFinder, threshold: float, depth: int) -> LightBeams:
 def _left(found: LightBeams) -> float:
     """Flux that photons carry on though it is not weak, as of `LightBeams.sums`."""
     return 0.0 if found.pieces is None else float(found.pieces.flux[~found.pieces.is_tail].sum())
+
+
+def _uncounted(found: LightBeams) -> float:
+    """Share of the light that entered whose end is not known, by the sums at three places of each band."""
+    ends = (*_ENDS.values(), SUM_LEFT, SUM_ROULETTE)
+    entered = sum(float(sums[SUM_ENTERED]) for sums in found.sums.values())
+    ended = sum(float(sums[list(ends)].sum()) for sums in found.sums.values())
+    return abs(entered - ended) / max(entered, 1e-300)
 
 
 def _finest(threshold: float, followed: float) -> float:

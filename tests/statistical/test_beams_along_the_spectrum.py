@@ -168,7 +168,8 @@ def test_photons_take_over_where_all_of_a_band_goes_on(lamp: str) -> None:
     of what photons carried, as much as the fan beside the onset holds. 0.1 % would be noticed."""
     rig, emission = over_an_edge(lamp)
     swept, _ = rig.polygons(emission, 1e-4)
-    assert not ((swept.centre[:, 0] > -1.0) & (swept.centre[:, 0] < -0.1)).any()
+    # Weak beams are drawn up to four texels of 0.02 from where their light goes.
+    assert not ((swept.centre[:, 0] > -1.0) & (swept.centre[:, 0] < -0.12)).any()
     [(leaves, _)] = search(rig.beams, [(emission, Search(3e-4, 1, 64, 0.005, faint=2e-5))], 2)
     pieces = pieces_of(leaves, rig.beams, 0, 1.0)
     lattice = PieceLattice(pieces, [cumulative(rig.axis, rig.scene.lights[0].spectral_power)], [1.0])
