@@ -22,7 +22,7 @@ def __getattr__(name: str) -> object:
     api = None if name.startswith("_") else import_module(".api", __name__)
     if api is None or name not in api.__all__:
         raise AttributeError(f"module 'spectrasplat' has no attribute '{name}'")
-    return getattr(api, name)
+    return globals().get(name) or getattr(api, name)  # `render` is the package, which `api` makes callable
 
 
 def __dir__() -> list[str]:

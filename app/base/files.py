@@ -40,7 +40,7 @@ DATA_BYTES = 2 << 30
 
 _everything = ContextVar("everything", default=False)
 _were_read: set[tuple[int, int]] = set()
-"""Devices and numbers of the files that this process has opened."""
+"""Devices and numbers of the files that were opened since `forget_read`."""
 
 
 class _Permission:
@@ -124,12 +124,17 @@ def with_part(name: str | os.PathLike[str]) -> tuple[Path, str]:
 
 
 def was_read(path: str | os.PathLike[str]) -> bool:
-    """Whether this process has read that file, by whatever name."""
+    """Whether that file was read since `forget_read`, by whatever name."""
     try:
         state = os.stat(path)
     except (OSError, ValueError):
         return False
     return (state.st_dev, state.st_ino) in _were_read
+
+
+def forget_read() -> None:
+    """A new piece of work begins: what was read before has no part in it."""
+    _were_read.clear()
 
 
 def check_regular(path: str | os.PathLike[str], limit: int) -> None:

@@ -30,6 +30,7 @@ T = TypeVar("T")
 
 def open_scene(values: OpensScene) -> Scene:
     """The scene of a command, with what its options say of the scene's own defaults and camera. Raises `UserError`."""
+    files.forget_read()
     path, opening = find_scene(values.scene), values.opening
     if opening is None:
         from ..model.io.scene_file import load_scene
@@ -49,7 +50,7 @@ def open_scene(values: OpensScene) -> Scene:
 
 
 def check_unread(output: Path | None) -> None:
-    """Raise `UserError` where an output would replace what this process has read to make it."""
+    """Raise `UserError` where an output would replace what was read to make it."""
     if output is not None and files.was_read(output):
         raise UserError(
             f"cannot write {output}: it is the scene itself, or a file that this is made of; choose another name"

@@ -230,7 +230,7 @@ def _exrs() -> tuple[bytes, ...]:
         path = Path(folder) / "a.exr"
         write_image(path, rgb)
         plain = path.read_bytes()
-        write_image(path, rgb, spectral=rgb, bin_edges_nm=np.array([400.0, 500, 600, 700]), metadata={"a": "b"})
+        write_image(path, rgb, spectral=rgb, bin_edges_nm=np.array([400.0, 500, 600, 700]))
         spectral = path.read_bytes()
         return plain, spectral, *(_exr(path, *each) for each in _EXR_KINDS)
 
@@ -254,7 +254,7 @@ def _exr(path: Path, names: tuple[str, ...], header: dict[str, object]) -> bytes
 
 
 def _npys() -> tuple[bytes, ...]:
-    return tuple(_stored(_levels().astype(kind)) for kind in (np.float32, np.float64, np.uint8))
+    return tuple(_stored(_levels().astype(kind)) for kind in (np.float16, np.float32, np.float64))
 
 
 def _stored(values: np.ndarray) -> bytes:
