@@ -130,12 +130,7 @@ WARNINGS = {
     ),
     "wound inconsistently": (
         ply(CORNERS + "3 0 1 2\n3 0 1 3\n3 1 2 3\n3 0 3 2\n"),
-        [
-            (
-                "inconsistently wound mesh 'm': 3 edges where neighbours face opposite ways; the side is decided by "
-                "the face normals"
-            )
-        ],
+        ["mesh 'm': 1 triangle turned to face as all others do"],
     ),
     "degenerate triangles": (
         ply(CORNERS + FACES + "3 0 0 1\n3 1 1 1\n", faces=6),

@@ -128,12 +128,56 @@ def test_non_manifold_edge() -> None:
     assert any("non-manifold mesh 'fin': 1 edge with more" in note for note in repair(fin)[1])
 
 
-def test_one_turned_triangle() -> None:
-    turned = BOX.triangles.copy()
-    turned[0] = turned[0, ::-1]
-    health = examine(replace(BOX, triangles=turned))
-    assert (health.inconsistent_edges, health.boundary_edges) == (3, 0)
-    assert not health.watertight and not health.inside_out
+@pytest.mark.parametrize("share", [0.01, 0.5, 0.99])
+@pytest.mark.parametrize("normals", ["true", "of the winding", None])
+def test_triangles_wound_by_chance_are_turned_with_their_normals(share: float, normals: str | None) -> None:
+    ball = primitives.sphere(1.0, 320)
+    # Two balls, one of which nobody turned: parts are judged each for itself.
+    other = ball.transformed(np.array([[1, 0, 0, 3], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]]))
+    turned = np.append(np.random.default_rng(3).random(320) < share, np.zeros(320, bool))
+    both = _joined(ball, other).triangles
+    triangles = np.where(turned[:, None], both[:, ::-1], both)
+    corners = np.concatenate([ball.corner_normals, other.corner_normals])
+    corners = np.where(turned[:, None, None], corners[:, ::-1], corners)
+    if normals == "of the winding":
+        corners = np.where(turned[:, None, None], -corners, corners)
+    spoilt = make_mesh("two", np.vstack([ball.vertices, other.vertices]), triangles, corners if normals else None)
+    assert examine(spoilt).inconsistent_edges > 0
+    mesh, notes = repair(spoilt)
+    assert examine(mesh).watertight and "turned to face as all others do" in notes[0]
+    one = 2.0 * (share < 0.7)  # where most were turned, the part faces inward and is said to
+    assert mesh.volume() == pytest.approx(one * ball.volume(), abs=1e-9)
+    if normals:
+        assert np.einsum("tcj,tj->tc", mesh.corner_normals, mesh.face_normals()).min() > 0.9 or one == 0.0
+
+
+def test_a_surface_with_one_side_is_left_as_it_is() -> None:
+    # A Möbius strip of five quadrilaterals, whose last is joined crosswise.
+    turn = np.arange(5) * np.pi / 5
+    ring = np.stack([np.cos(2 * turn), np.sin(2 * turn), 0 * turn], axis=1)
+    out = 0.3 * np.stack([np.cos(turn) * np.cos(2 * turn), np.cos(turn) * np.sin(2 * turn), np.sin(turn)], axis=1)
+    rows = [(a, a + 1, a + 5) for a in range(4)] + [(a + 1, a + 6, a + 5) for a in range(4)] + [(4, 5, 9), (5, 0, 9)]
+    strip = make_mesh("strip", np.vstack([ring - out, ring + out]), rows)
+    mesh, notes = repair(strip)
+    assert any("inconsistently wound" in note for note in notes)
+    np.testing.assert_array_equal(mesh.triangles, strip.triangles)
+
+
+def test_doubled_triangles_are_dropped_where_that_leaves_a_solid() -> None:
+    reversed_too = make_mesh("b", BOX.vertices, np.vstack([BOX.triangles, np.roll(BOX.triangles[:, ::-1], 1, axis=1)]))
+    alike = make_mesh("b", BOX.vertices, np.vstack([BOX.triangles, BOX.triangles[:2]]))
+    for spoilt, dropped in ((reversed_too, 12), (alike, 2)):
+        mesh, notes = repair(spoilt)
+        assert notes == (f"mesh 'b': {dropped} triangles on the same corners as others dropped",)
+        assert mesh.is_closed and mesh.volume() == pytest.approx(1.0)
+    # Of two tetrahedra that touch, the common wall goes; so does a fin with two sides.
+    corners = np.array([(0.0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1)])
+    upper = np.array([(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)])
+    lower = np.array([(0, 1, 2), (1, 0, 4), (2, 1, 4), (0, 2, 4)])
+    mesh, notes = repair(make_mesh("t", corners, np.vstack([upper, lower])))
+    assert len(mesh.triangles) == 6 and mesh.volume() == pytest.approx(1.0 / 3.0)
+    fin = make_mesh("fin", np.vstack([BOX.vertices, (0.0, 0.0, 2.0)]), np.vstack([BOX.triangles, (4, 5, 8), (8, 5, 4)]))
+    assert len(repair(fin)[0].triangles) == 12
 
 
 def test_inside_out_solid_is_turned() -> None:

@@ -182,10 +182,10 @@ def examine(mesh: Mesh) -> MeshHealth:
 def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> tuple[Mesh, tuple[str, ...]]:
     """Mend what can be mended without a guess, and say in one sentence each what was done or assumed.
 
-    Welds vertices at equal positions and seams that gape by rounding, drops triangles without area, winds what lies in
-    one plane one way, turns an inside-out solid, and replaces zero shading normals by the face's. Open, non-manifold
-    and inconsistently wound meshes are kept, with a warning where the mesh is to be `solid` (a table may well be open).
-    Raises UserError when nothing but degenerate triangles is left.
+    Welds vertices at equal positions and seams that gape by rounding, drops triangles without area and doubles, winds
+    neighbours one way, turns an inside-out solid, and replaces zero shading normals by the face's. Open and
+    non-manifold meshes are kept, with a warning where the mesh is to be `solid` (a table may well be open). Raises
+    UserError when nothing but degenerate triangles is left.
     """
     health = health or examine(mesh)
     notes: list[str] = []
@@ -205,8 +205,16 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
         normals = np.where(zero[..., None], mesh.face_normals()[:, None], mesh.corner_normals)
         mesh = replace(mesh, corner_normals=normals)
         notes.append(f"{label}: {count_of(health.zero_normals, 'zero normal')} replaced by the face normal")
-    if health.inconsistent_edges and mesh.is_flat:
-        mesh = _wound_alike(mesh)
+    if health.non_manifold_edges:
+        mesh, dropped = _without_doubles(mesh)
+        if dropped:
+            notes.append(f"{label}: {count_of(dropped, 'triangle')} on the same corners as others dropped")
+            health = examine(mesh)
+    if health.inconsistent_edges:
+        against = _against_the_largest(mesh) if mesh.is_flat else _against_neighbours(mesh)
+        mesh = _turned(mesh, against)
+        if against.any() and not mesh.is_flat:
+            notes.append(f"{label}: {count_of(int(against.sum()), 'triangle')} turned to face as all others do")
         health = examine(mesh)
     if health.inside_out:
         mesh = mesh.flipped()
@@ -224,21 +232,44 @@ def repair(mesh: Mesh, health: MeshHealth | None = None, solid: bool = True) -> 
     ), tuple(notes)
 
 
-def _wound_alike(mesh: Mesh) -> Mesh:
-    """A flat mesh all of whose triangles face as the largest does."""
+def _against_the_largest(mesh: Mesh) -> np.ndarray:
+    """Which triangles of a flat mesh face against its largest, bool (T,)."""
     normals = mesh.face_normals()
-    turned = (normals @ normals[int(np.argmax(mesh.areas()))] < 0.0)[:, None]
-    other = mesh.flipped()
-    corners = (
-        None
-        if mesh.corner_normals is None or other.corner_normals is None
-        else (mesh.corner_normals, other.corner_normals)
-    )
+    return normals @ normals[int(np.argmax(mesh.areas()))] < 0.0
+
+
+def _against_neighbours(mesh: Mesh) -> np.ndarray:
+    """Which triangles to turn, bool (T,), so that neighbours across edges of two face one way: in each connected part
+    those of less area; none in a part that has no two sides."""
+    order, same, vertex = half_edges(mesh)
+    follows, leads = np.append(same, False), np.append(False, same)
+    one = np.flatnonzero(follows & ~leads & ~np.append(follows[1:], False))  # the first of two
+    a, b = order[one], order[one + 1]
+    start, count = vertex.ravel(), len(vertex)
+    against = (start[a] == start[b]) * count
+    # A graph of both ways to wind each triangle, t as it is and t + count turned.
+    a, b = a // 3, b // 3
+    root = connected_roots(np.append(a, a + count), np.append(b + against, b + count - against), 2 * count)
+    as_it_is, other = root[:count], root[count:]
+    part = np.minimum(as_it_is, other)
+    second = as_it_is > other
+    area = np.bincount(part, np.where(second, -1.0, 1.0) * mesh.areas(), 2 * count)[part]
+    return np.where(area < 0.0, ~second, second) & (as_it_is != other)
+
+
+def _turned(mesh: Mesh, which: np.ndarray) -> Mesh:
+    """The mesh with the triangles `which`, bool (T,), wound the other way; their normals lie on their new outside."""
+    other, rows = mesh.flipped(), which[:, None]
+    normals = mesh.corner_normals
+    if normals is not None:
+        normals = np.where(rows[..., None], normals[:, ::-1], normals)
+        against = np.einsum("tcj,tj->t", normals, other.area_vectors()) < 0.0
+        normals = np.where((which & against)[:, None, None], -normals, normals)
     return replace(
         mesh,
-        triangles=np.where(turned, other.triangles, mesh.triangles),
-        corner_normals=None if corners is None else np.where(turned[..., None], corners[1], corners[0]),
-        uv=None if mesh.uv is None or other.uv is None else np.where(turned[..., None], other.uv, mesh.uv),
+        triangles=np.where(rows, other.triangles, mesh.triangles),
+        corner_normals=normals,
+        uv=None if mesh.uv is None or other.uv is None else np.where(rows[..., None], other.uv, mesh.uv),
     )
 
 
@@ -330,15 +361,35 @@ def _without_degenerate(mesh: Mesh, health: MeshHealth) -> tuple[Mesh, int]:
         drop &= (t[:, 0] == t[:, 1]) | (t[:, 1] == t[:, 2]) | (t[:, 2] == t[:, 0])
     if drop.all():
         raise UserError(f"{mesh.source or mesh.name}: every triangle is degenerate; export the mesh again")
-    keep = ~drop
-    return (
-        replace(
-            mesh,
-            triangles=mesh.triangles[keep],
-            corner_normals=None if mesh.corner_normals is None else mesh.corner_normals[keep],
-            uv=None if mesh.uv is None else mesh.uv[keep],
-        ),
-        int(drop.sum()),
+    return _kept(mesh, ~drop), int(drop.sum())
+
+
+def _without_doubles(mesh: Mesh) -> tuple[Mesh, int]:
+    """Drop what lies on other triangles, where that leaves a watertight mesh, and count it.
+
+    That is all but one of each group on the same corners, as of faces with two sides; or, of a group that faces both
+    ways alike, all, as of a wall between two solids that touch, or of a fin.
+    """
+    corners = np.sort(mesh.triangles, axis=1)
+    first, group = weld_map(corners.astype(np.float64))
+    # The order of three corners from the lowest on: ascending to one side, descending to the other.
+    lowest = np.argmin(mesh.triangles, axis=1)[:, None]
+    second = np.take_along_axis(mesh.triangles, (lowest + 1) % 3, axis=1)[:, 0]
+    excess = np.bincount(group, np.where(second == corners[:, 1], 1, -1))
+    for kept in (first, first[excess != 0]):
+        single = _kept(mesh, np.isin(np.arange(len(corners)), kept))
+        if len(kept) and examine(single).watertight:
+            return single, len(corners) - len(kept)
+    return mesh, 0
+
+
+def _kept(mesh: Mesh, keep: np.ndarray) -> Mesh:
+    """The triangles `keep`, bool (T,), alone, with all vertices."""
+    return replace(
+        mesh,
+        triangles=mesh.triangles[keep],
+        corner_normals=None if mesh.corner_normals is None else mesh.corner_normals[keep],
+        uv=None if mesh.uv is None else mesh.uv[keep],
     )
 
 
