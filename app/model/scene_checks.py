@@ -24,6 +24,9 @@ ON_SURFACE = 1e-9
 """Share of a mesh's longest side: a point so near to a facet is on it."""
 _CONTACT, _MOST_TRIED = 1e-3, 64
 """Share of a crystal's size that a sheet on it may be away, and how many of its facets are tried."""
+MIN_THICKNESS = 5e-6
+"""Of a solid, as a share of half the diagonal of all glass and mirrors: of a thinner one rays in float32 meet one side
+only, and none may get through."""
 MIN_SIZE = 1e-12
 """Least size of the largest object, and one over its greatest: inverse squares of areas are then numbers in float32."""
 
@@ -60,6 +63,7 @@ def check_scene(scene: Scene, file_name: str) -> list[str]:
     return (
         _glass_notes(glasses)
         + _sheet_notes(glasses)
+        + _thin_notes(scene)
         + [
             f"light '{light.name}' has no power: it gives no light"
             for light in scene.lights
@@ -248,6 +252,32 @@ def _sheet_notes(glasses: list[SceneObject]) -> list[str]:
         ],
     }
     return [f"{listed([o.name for o in of])}: {what}" for what, of in notes.items() if of]
+
+
+def _thin_notes(scene: Scene) -> list[str]:
+    """Solids of glass so thin that they may let no light through."""
+    solids = [o for o in scene.objects if o.material.is_solid and o.mesh.is_closed]
+    if not solids:
+        return []
+    bounds = np.stack([o.world_bounds for o in scene.objects if o.material.is_specular])
+    least = MIN_THICKNESS * 0.5 * float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
+    meshes = {id(o.mesh): o.mesh for o in solids}
+    own = {key: _thickness(mesh) for key, mesh in meshes.items()}
+    thin = [
+        o.name
+        for o in solids
+        if own[id(o.mesh)] * np.linalg.svd(o.object_to_world[:3, :3], compute_uv=False)[-1] < least
+        and _thickness(o.mesh.transformed(o.object_to_world)) < least
+    ]
+    what = (
+        f"thinner than {least:.2g}, light may not pass it next to all other glass; a plane with thin = true is a pane"
+    )
+    return [f"{listed(thin)}: {what}"] if thin else []
+
+
+def _thickness(mesh: Mesh) -> float:
+    """Of a closed mesh that is a plate; of a ball a third of its diameter."""
+    return 2.0 * abs(mesh.volume()) / float(mesh.areas().sum())
 
 
 def _glass_notes(glasses: list[SceneObject]) -> list[str]:

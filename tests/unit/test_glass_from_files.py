@@ -185,6 +185,19 @@ def test_mtl_glass(tmp_path: Path, name: str) -> None:
     assert word in " ".join(scene.notes) and sum("shown" in note for note in scene.notes) >= (word != "")
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("slab", ["thickness = {t}", "thickness = 1\nscale = [1, 1, {t}]"])
+def test_a_plate_that_no_light_would_pass_is_named(unit: float, slab: str, tmp_path: Path) -> None:
+    # GPU renderings of plates of 2 by 2 are black at 4e-6 and right at 1e-5 and above (reference: 1.000).
+    for thickness, named in ((1e-6, True), (4e-6, True), (1e-5, False), (1e-2, False)):
+        sizes = f"width = {2 * unit}\nheight = {2 * unit}\nrotation_deg = [20, 10, 0]\n"
+        sizes += slab.format(t=thickness * unit)
+        ball = f'shape = "sphere"\nradius = {0.1 * unit}\n'
+        (tmp_path / "s.toml").write_text(f'[[objects]]\nname = "p"\nshape = "slab"\n{sizes}\n[[objects]]\n{ball}')
+        notes = [note for note in load_scene(tmp_path / "s.toml").notes if "light may not pass" in note]
+        assert len(notes) == named and all(note.startswith("'p': thinner than 7") for note in notes)
+
+
 def test_a_scene_file_makes_sheets(tmp_path: Path) -> None:
     table = """
         [camera]
