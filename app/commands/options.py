@@ -363,4 +363,4 @@ def share(flag: str, text: str) -> tuple[int, int]:
 def _is_integer(text: str) -> bool:
     """ASCII digits with an optional sign, of a length that int() takes gladly."""
     digits = text.removeprefix("-").removeprefix("+")
-    return digits.isascii() and digits.isdigit() and len(digits) <= 18
+    return digits.isascii() and digits.isdigit() and len(digits) <= 4000

@@ -154,6 +154,7 @@ OPTIONS = {
     "receiver": option_case("--layer map:flor", "'map:flor'", "'scene'", "'map:plane'"),
     "unknown option": option_case("--sead 3", "--sead", "--seed", "--help"),
     "size of three": option_case("--size 4x4x4", "is not WIDTHxHEIGHT"),
+    "a seed of twenty digits": option_case("--seed 99999999999999999999", "out of range", "between 0 and 4294967295"),
     "half a photon": option_case("--photons 1.5", "--photons '1.5' is not a whole number"),
     "photons infinite": option_case("--photons inf", "beyond what memory can hold"),
     "photons beyond counting": option_case("--photons 2e12", "beyond what can be counted"),
