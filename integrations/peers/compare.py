@@ -35,7 +35,7 @@ COMPILE = ["-O3", "-march=native", "-ffast-math", "-fno-finite-math-only", "-fop
 TIMEOUT_S = 200.0
 REFERENCE_SAMPLES, REFERENCE_PHOTONS = (
     256,
-    {"prism": 200_000_000, "ball": 200_000_000, "brilliant": 150_000_000, "goblet": 30_000_000},
+    {"prism": 200_000_000, "ball": 200_000_000, "brilliant": 150_000_000, "gem": 150_000_000, "goblet": 30_000_000},
 )
 
 Rungs = list[tuple[Any, ...]]
@@ -51,6 +51,7 @@ LADDERS: dict[str, dict[str, Rungs]] = {
     "mitsuba": {
         "": [(12, 16, "ptracer"), (16, 48, "ptracer"), (24, 128, "ptracer")],
         "brilliant": [(12, 16, "ptracer"), (16, 48, "ptracer")],
+        "gem": [(12, 16, "ptracer"), (16, 48, "ptracer")],
         "goblet": [(12, 8, "ptracer"), (12, 24, "ptracer"), (16, 48, "ptracer")],
     },
     "luxcore": {"": [(8, 8, "BIDIRCPU"), (12, 24, "BIDIRCPU"), (16, 48, "BIDIRCPU")]},
@@ -60,6 +61,7 @@ LADDERS: dict[str, dict[str, Rungs]] = {
         "goblet": [(4, 16, "mnee")],
         "prism": [(4, 16, "mnee")],
         "brilliant": [(4, 16, "mnee")],
+        "gem": [(4, 16, "mnee")],
     },
     "pbrt": {"": [(16, 100_000, "sppm"), (64, 200_000, "sppm"), (256, 200_000, "sppm")]},
 }
@@ -225,7 +227,8 @@ def shown(xyz: np.ndarray, scale: float) -> np.ndarray:
 def strip(scene: str, out: Path, rows: list[dict[str, Any]], truth: np.ndarray) -> None:
     """The reference and each peer's longest picture at one exposure, side by side."""
     scale = 0.9 / np.percentile(truth[..., 1][truth[..., 1] > 0.001 * truth[..., 1].max()], 90)
-    last = {row["peer"]: row for row in rows if row["scene"] == scene and row.get("file")}
+    done = {row["peer"]: row for row in rows if row["scene"] == scene and row.get("file")}
+    last = {peer: done[peer] for peer in LADDERS if peer in done}
     pictures = [truth, *(picture_of(out / row["file"], row["peer"] in OURS) for row in last.values())]
     Image.fromarray(np.concatenate([shown(picture, scale) for picture in pictures], axis=1)).save(out / f"{scene}.png")
     print(f"{out / scene}.png: reference, {', '.join(last)}")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 HERE = Path(__file__).resolve().parent
-SCENES = ("prism", "ball", "brilliant", "goblet")
+SCENES = ("prism", "ball", "brilliant", "gem", "goblet")
 BAND_NM = 401.0
 RGB_TO_XYZ = np.array([[0.41239, 0.35758, 0.18048], [0.21264, 0.71517, 0.07219], [0.01933, 0.11919, 0.95053]])
 """Of linear Rec.709."""
