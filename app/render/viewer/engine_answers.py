@@ -85,21 +85,17 @@ class EngineAnswers:
         """What of the wanted scene the picture does not show yet, as in `LiveStats`."""
         if self.schedule.moved and not self.schedule.building:
             return "moved"
-        if self._awaits_maps:
-            return "light" if self._shows_former else ""
+        if self._shows_former:
+            return "light"
         if self._wanted is None or not self.schedule.building:
             return ""
         return "scene" if self._level == DirtyLevel.BUILD else "light"
 
     @property
-    def _awaits_maps(self) -> bool:
-        """What is shown stays until all stored photons are in the maps."""
-        return self.schedule.splatting and not self.schedule.shows_preview and self._shown is not None
-
-    @property
     def _shows_former(self) -> bool:
-        """Meanwhile the light of before an edit is seen."""
-        return self._awaits_maps and self._shown is not None and not self._shown.light.shows_outdated
+        """The light of before an edit stays until all stored photons are in the maps."""
+        awaits_maps = self.schedule.splatting and not self.schedule.shows_preview
+        return awaits_maps and self._shown is not None and not self._shown.light.shows_outdated
 
     @property
     def is_busy(self) -> bool:
