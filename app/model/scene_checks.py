@@ -261,17 +261,8 @@ def _thin_notes(scene: Scene) -> list[str]:
         return []
     bounds = np.stack([o.world_bounds for o in scene.objects if o.material.is_specular])
     least = MIN_THICKNESS * 0.5 * float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
-    meshes = {id(o.mesh): o.mesh for o in solids}
-    own = {key: _thickness(mesh) for key, mesh in meshes.items()}
-    thin = [
-        o.name
-        for o in solids
-        if own[id(o.mesh)] * np.linalg.svd(o.object_to_world[:3, :3], compute_uv=False)[-1] < least
-        and _thickness(o.mesh.transformed(o.object_to_world)) < least
-    ]
-    what = (
-        f"thinner than {least:.2g}, light may not pass it next to all other glass; a plane with thin = true is a pane"
-    )
+    thin = [o.name for o in solids if _thickness(o.mesh.transformed(o.object_to_world)) < least]
+    what = f"thinner than {least:.2g}, light may not pass it next to all other glass; make a pane a thin plane"
     return [f"{listed(thin)}: {what}"] if thin else []
 
 
