@@ -134,7 +134,7 @@ def test_a_stop_before_the_first_camera_sample_waits_for_it(gl: Context, name: s
 
 
 # Ten per cent is for a machine that has nothing else to do (slow: alone, without other tests beside it).
-@pytest.mark.parametrize("within", [0.9, pytest.param(0.1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("within", [3.0, pytest.param(0.1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("name", "layer"), [pytest.param("ball", "beauty", marks=pytest.mark.slow), ("prism", "map:table")]
 )
@@ -150,7 +150,7 @@ def test_seconds_are_those_of_the_whole_picture(gl: Context, name: str, layer: s
     started = time.perf_counter()
     result = render(scene, settings, progress=lambda share, text: told.append(share), context=gl)
     took = time.perf_counter() - started
-    assert took == pytest.approx(seconds, rel=within)
+    assert max(1.0 - within, 0.5) <= took / seconds <= 1.0 + within
     light = result.stats.light
     assert light.trace_seconds + light.splat_seconds > (1.5 if within < 0.5 else 0.1) and result.rgb.max() > 0.0
     assert told == sorted(told) and told[-1] > 0.85
