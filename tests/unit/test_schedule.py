@@ -165,16 +165,17 @@ def test_better_maps_wait_for_a_cycle_of_bands() -> None:
 
 
 @pytest.mark.parametrize(
-    ("schedule", "passes"),
+    ("schedule", "passes", "is_other"),
     [
-        (SHOWN, 1),
-        (replace(SHOWN, shows_preview=True), 2),
-        (replace(SHOWN, splatting=True), 2),
-        (replace(SHOWN, interacting=True), 2),
+        (SHOWN, 1, False),
+        (replace(SHOWN, shows_preview=True), 2, False),
+        (replace(SHOWN, splatting=True), 2, False),
+        (replace(SHOWN, interacting=True), 2, False),
+        (SHOWN, 2, True),
     ],
 )
-def test_finer_or_other_maps_do_not_wait(schedule: Schedule, passes: int) -> None:
-    shown, (action,) = step(schedule, MapsReady(passes, MID_CYCLE), 0.0)
+def test_finer_or_other_maps_do_not_wait(schedule: Schedule, passes: int, is_other: bool) -> None:
+    shown, (action,) = step(schedule, MapsReady(passes, MID_CYCLE, is_other), 0.0)
     assert isinstance(action, ShowMaps) and not shown.maps_wait and not shown.shows_preview
     assert action.same_view == (not schedule.interacting)
     assert action.finer_maps == (not schedule.interacting)

@@ -212,6 +212,7 @@ class LiveEngine(EngineAnswers):
         owed = PREVIEW_OVERRUN_S if camera.is_coarse else 0.25 * budget_s
         end = max(deadline, time.perf_counter() + owed) if camera.owes_picture else deadline
         self._tally.seconds["camera"] += self._camera_pass.advance(end, one_sample=self.schedule.interacting)
+        self._awaits_picture &= self._camera.owes_picture
         self._tell(events.CameraWorked(self._camera))
         if self.schedule.interacting and self.schedule.splatting and self._shown and self._shown.light.shows_outdated:
             # A camera that moves for long shall not see the former maps all the while.
@@ -253,6 +254,7 @@ class LiveEngine(EngineAnswers):
                 self._restart_camera(same_view=True)
             case ShowMaps(same_view, finer_maps):
                 assert self._shown is not None
+                self._awaits_picture = self._shows_former
                 self._set_maps(self._shown.light.light_pass.maps)
                 self._restart_camera(same_view=same_view, finer_maps=finer_maps)
 
@@ -407,12 +409,16 @@ class LiveEngine(EngineAnswers):
         before, self._shown = self._shown, built
         self._building.drop()
         self._splatting, self._tracing = iter(()), built.steps
-        self._inputs = built.traced
+        shown, self._inputs = self._inputs, built.traced
+        is_other = self.schedule.splatting or (
+            shown is not None and dirty_level(shown, shown, built.traced) >= DirtyLevel.SPLAT
+        )
         if before is not None:
             self._rays_before += before.light.light_pass.trace.rays_traced
             before.light.release()
+        self._awaits_picture = is_other and before is not None
         self._tell(events.Built(built.light.is_coarse))
-        self._maps_ready()
+        self._tell(events.MapsReady(built.accumulation.number, self._camera, is_other))
 
     # ---- light -------------------------------------------------------------------------------
 

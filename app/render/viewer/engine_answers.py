@@ -42,6 +42,8 @@ class EngineAnswers:
         """What the picture shows."""
         self._shown: Shown | None = None
         self._building = Building(context)
+        self._awaits_picture = False
+        """There are maps of other light than that of the picture, which stays for now."""
         self._tally = WorkTally()
         self._rays_before = 0
         """Rays of the light passes that are gone."""
@@ -93,9 +95,11 @@ class EngineAnswers:
 
     @property
     def _shows_former(self) -> bool:
-        """The light of before an edit stays until all stored photons are in the maps."""
+        """The light of before an edit is seen until all stored photons are in the maps, and the picture by these is
+        as smooth as the former."""
         awaits_maps = self.schedule.splatting and not self.schedule.shows_preview
-        return awaits_maps and self._shown is not None and not self._shown.light.shows_outdated
+        stays = awaits_maps and self._shown is not None and not self._shown.light.shows_outdated
+        return stays or self._awaits_picture
 
     @property
     def is_busy(self) -> bool:

@@ -128,10 +128,12 @@ class SplattingBegan:
 
 @dataclass(frozen=True)
 class MapsReady:
-    """The maps are worth showing. `passes`: complete ones of this size that they hold."""
+    """The maps are worth showing. `passes`: complete ones of this size that they hold; `is_other`: the light of another
+    scene than the picture shows."""
 
     passes: int
     camera: CameraState = CameraState()
+    is_other: bool = False
 
 
 @dataclass(frozen=True)
@@ -310,7 +312,7 @@ def _built(s: Schedule) -> Schedule:
 def _maps_ready(s: Schedule, event: MapsReady) -> Next:
     """More photons of the same kind wait until the camera has seen every band of the spectrum, finer ones until all
     pixels of glass are seen."""
-    anew = s.shows_preview or s.splatting
+    anew = s.shows_preview or s.splatting or event.is_other
     waits = event.passes > 1 or not event.camera.is_whole
     if waits and not anew and not s.interacting and event.camera.is_within_cycle:
         return replace(s, maps_wait=True), ()
