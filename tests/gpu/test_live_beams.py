@@ -107,19 +107,22 @@ def test_an_edit_of_one_glass_leaves_the_light_of_the_others(gl: Context) -> Non
 
 def test_light_traced_anew_takes_the_place_of_light_as_fine(gl: Context) -> None:
     engine = LiveEngine(gl, replace(gl.traits.viewer, first_photons=1 << 12, largest_photons=1 << 14))
-    engine.target_photons, engine.camera_samples = 1 << 14, 1
+    engine.target_photons, engine.camera_samples = 1 << 14, 8
     try:
         engine.set(inputs(scene := shipped("prism")))
         until_idle(engine)
         traced = engine._shown
         assert traced is not None and traced.accumulation.finest == 1 << 14
         engine.set(inputs(edited(scene, 2.0)))
-        deadline = time.perf_counter() + 60.0
+        deadline, seen, waited = time.perf_counter() + 60.0, engine.picture_version, 0
         while engine._shown is traced:
-            engine.advance(0.02)
+            engine.advance(0.002)
             assert time.perf_counter() < deadline and (engine.stats.differs == "light") >= engine.schedule.building
-            if engine.schedule.splatting:  # what is seen is of before the edit
+            seen = engine.picture_version if engine.schedule.splatting else seen
+            if engine.picture_version == seen:  # what is seen is of before the edit
                 assert engine.stats.differs == "light" and not engine.stats.first_order
+                waited = 0 if engine.schedule.splatting else waited + 1
+        assert waited < 2  # a first picture by the new light is not as smooth as the former
         assert engine._shown is not None and engine._shown.accumulation.finest == 1 << 14
         assert not engine.schedule.maps_are_coarse
     finally:

@@ -256,7 +256,8 @@ class LiveEngine(EngineAnswers):
                 assert self._shown is not None
                 self._awaits_picture = self._shows_former
                 self._set_maps(self._shown.light.light_pass.maps)
-                self._restart_camera(same_view=same_view, finer_maps=finer_maps)
+                # Other light is shown as soon as can be, better light when it is as smooth.
+                self._restart_camera(same_view=same_view and not self._awaits_picture, finer_maps=finer_maps)
 
     @property
     def _first_budget(self) -> Budget:
