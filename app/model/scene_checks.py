@@ -4,6 +4,7 @@ range."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -261,7 +262,7 @@ def _thin_notes(scene: Scene) -> list[str]:
         return []
     bounds = np.stack([o.world_bounds for o in scene.objects if o.material.is_specular])
     least = MIN_THICKNESS * 0.5 * float(np.linalg.norm(bounds[:, 1].max(axis=0) - bounds[:, 0].min(axis=0)))
-    thin = [o.name for o in solids if _thickness(o.mesh.transformed(o.object_to_world)) < least]
+    thin = [o.name for o in solids if _thickness(replace(o.mesh, vertices=o.world_vertices)) < least]
     what = f"thinner than {least:.2g}, light may not pass it next to all other glass; make a pane a thin plane"
     return [f"{listed(thin)}: {what}"] if thin else []
 
